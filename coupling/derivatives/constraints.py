@@ -1,83 +1,197 @@
 """What constraints leave of a derivative: closed gaps stay closed, units that stick stay, sliders follow.
 
-Maps of derivatives M (2N, k + P) of u, by k numbers of the start and by P of the scene: a matrix for all, and a part of
-its own for the latter, since gaps and directions depend on these.
+Maps of derivatives M (2N, k + P) of u, by k numbers of the start and by P of the scene: a matrix for places, one for
+rates, and a part of their own for the latter, since gaps and directions depend on these.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import Dynamics
-from vanedamp.coupling.derivatives.numbers import Numbers
-from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.system.unit_laws import SINGULAR, rubs, ways
+from vanedamp.coupling.derivatives.matrices import (
+    add_product,
+    dot,
+    integers,
+    inverse_of_rows,
+    matrix,
+    product,
+    unit,
+    vector,
+)
+from vanedamp.coupling.numerics.codes import CLOSED, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
+from vanedamp.coupling.numerics.compiler.jit import counting, inlined
 
 
-class Affine(NamedTuple):
-    """The map M -> matrix M + (0, own): matrix (n, n), own (n, P)."""
+class Map(NamedTuple):
+    """The map M -> (places, rates) M + (0, own): matrices (N, N), own (2N, P)."""
 
-    matrix: np.ndarray
+    places: np.ndarray
+    rates: np.ndarray
     own: np.ndarray
 
-    def __call__(self, M: np.ndarray) -> np.ndarray:
-        """Return the derivative (n, k + P) after the map."""
-        found = self.matrix @ M
-        found[:, M.shape[1] - self.own.shape[1] :] += self.own
-        return found
 
-    def then(self, other: Affine) -> Affine:
-        """Return this map and then another."""
-        return Affine(other.matrix @ self.matrix, other.matrix @ self.own + other.own)
-
-    def part(self, rows: slice) -> Affine:
-        """Return the part of some rows, which others do not enter."""
-        return Affine(self.matrix[rows, rows], self.own[rows])
+@inlined
+def presses(state):
+    """Return whether a contact in a state is closed with a force of its own."""
+    return state < OPEN or state == CLOSED
 
 
-class Constraints:
-    """The constraints of a system, with what P numbers change in them; numbers: None for P = 0."""
-
-    def __init__(self, dynamics: Dynamics, numbers: Numbers | None) -> None:
-        self.dynamics, self.numbers = dynamics, numbers
-        self._nothing = np.zeros((dynamics.one, 0 if numbers is None else len(numbers)))
-
-    def held(self, closed: np.ndarray, stuck: np.ndarray, z: np.ndarray) -> Affine:
-        """Return the map that keeps contacts (u,) closed and slips zero at z (K,): see Dynamics.held."""
-        matrix = self.dynamics.held(closed, stuck)
-        if self.numbers is None:
-            return Affine(matrix, self._nothing)
-        d, of, own, u = self.dynamics, self.numbers.parts, self._nothing.copy(), len(closed)
-        normal, both = d.rows[:u][closed], np.vstack([d.rows[:u][closed], d.rows[u:][stuck]])
-        moved = np.concatenate([of.rows[:, :u][:, closed], of.rows[:, u:][:, stuck]], axis=1)
-        own[d.places] = -d.rate[:, None] * (pseudo_inverse(normal) @ (of.gap[:, closed] @ z).T)
-        own[d.rates] = -pseudo_inverse(both) @ (moved @ z[d.rates]).T
-        return Affine(matrix, own)
-
-    def followed(self, state: np.ndarray, z: np.ndarray) -> Affine:
-        """Return the map of sliders as they are in states (u,): see Dynamics.followed."""
-        matrix = self.dynamics.followed(state)
-        if self.numbers is None or not len(self.dynamics.sliders):
-            return Affine(matrix, self._nothing)
-        d, of, own, n = self.dynamics, self.numbers.parts, self._nothing.copy(), len(self.dynamics.root)
-        of_jenkins = state[d.jenkins]
-        slips = of_jenkins != codes.STICK
-        places = of.follows[:, :, :n] @ z[d.places] - ways(of_jenkins) * of.bound
-        own[d.sliders[slips]] = places[:, slips].T
-        own[n + d.sliders[slips]] = (of.follows[:, :, n:] @ z[d.rates])[:, slips].T
-        return Affine(matrix, own)
-
-    def begun(self, state: np.ndarray, closed: np.ndarray, z: np.ndarray) -> Affine:
-        """Return the map that contacts `closed` (u,) and units that stick in states (u,) leave at z (K,)."""
-        system = self.dynamics.system
-        held = self.held(closed & np.isinf(system.spring), (state == codes.STICK) & rubs(system), z)
-        return held.then(self.followed(state, z))
+@inlined
+def slips(state):
+    """Return whether a unit in a state slips; the state is the direction then, as a factor."""
+    return state == SLIP_LEFT or state == SLIP_RIGHT
 
 
-def pseudo_inverse(rows: np.ndarray) -> np.ndarray:
-    """Return the pseudo-inverse (N, m) of rows that may depend on each other."""
-    length = np.linalg.norm(rows, axis=1)
-    length = np.where(length > 0.0, length, 1.0)
-    return np.asarray(np.linalg.pinv(rows / length[:, None], rcond=SINGULAR) / length)
+@counting
+def identity(room, eq, turns):
+    """Return the map that changes nothing."""
+    size = len(eq.root)
+    return Map(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.count))
+
+
+@counting
+def applied(room, map_, M):
+    """Return the derivative (2N, k + P) after a map."""
+    size, P = len(map_.places), map_.own.shape[1]
+    found = matrix(room, 2 * size, M.shape[1])
+    add_product(found[:size], map_.places, M[:size])
+    add_product(found[size:], map_.rates, M[size:])
+    first = M.shape[1] - P
+    for i in range(2 * size):
+        for p in range(P):
+            found[i, first + p] += map_.own[i, p]
+    return found
+
+
+@counting
+def then(room, one, other):
+    """Return a map and then another."""
+    size = len(one.places)
+    own = matrix(room, 2 * size, one.own.shape[1])
+    add_product(own[:size], other.places, one.own[:size])
+    add_product(own[size:], other.rates, one.own[size:])
+    for i in range(2 * size):
+        for p in range(own.shape[1]):
+            own[i, p] += other.own[i, p]
+    return Map(product(room, other.places, one.places), product(room, other.rates, one.rates), own)
+
+
+@counting
+def held(room, eq, turns, closed, stuck, z):
+    """Return the map, in the metric of mass, that keeps contacts (u,) closed and slips zero, at z (K,).
+
+    Both sides move by forces between them only, which keep their momentum and their centre of mass.
+    """
+    size, units = len(eq.root), len(closed)
+    found, count, more = identity(room, eq, turns), 0, 0
+    for r in range(units):
+        count += closed[r]
+        more += stuck[r]
+    normal, both, rows = matrix(room, count, size), matrix(room, count + more, size), integers(room, count + more)
+    n, m = 0, count
+    for r in range(units):
+        if closed[r]:
+            rows[n] = r
+            normal[n], both[n] = eq.rows[r], eq.rows[r]
+            n += 1
+        if stuck[r]:
+            rows[m] = units + r
+            both[m] = eq.rows[units + r]
+            m += 1
+    inverse, of_both = inverse_of_rows(room, normal), inverse_of_rows(room, both)
+    on_places, on_rates = product(room, inverse, normal), product(room, of_both, both)
+    for i in range(size):
+        for k in range(size):
+            found.places[i, k] -= eq.rate[i] * on_places[i, k] / eq.rate[k]
+            found.rates[i, k] -= on_rates[i, k]
+    for p in range(turns.count):
+        for a in range(count):
+            opened = dot(turns.gap[p, rows[a]], z)
+            for i in range(size):
+                found.own[i, p] -= eq.rate[i] * inverse[i, a] * opened
+        for a in range(count + more):
+            moved = dot(turns.rows[p, rows[a]], z[size:])
+            for i in range(size):
+                found.own[size + i, p] -= of_both[i, a] * moved
+    return found
+
+
+@counting
+def followed(room, eq, turns, state, z):
+    """Return the map to sliders as they are in states (u,): those that slip follow what draws them, others rest."""
+    size, sliders, found = len(eq.root), len(eq.bound), identity(room, eq, turns)
+    for j in range(sliders):
+        at, way = size - sliders + j, state[eq.jenkins + j]
+        for k in range(size):
+            found.rates[at, k] = 0.0
+        if way == STICK:
+            continue
+        for k in range(size):
+            found.places[at, k], found.rates[at, k] = eq.follows[j, k], eq.follows[j, size + k]
+        for p in range(turns.count):
+            found.own[at, p] = dot(turns.follows[p, j, :size], z)
+            if slips(way):
+                found.own[at, p] -= way * turns.bound[p, j]
+            found.own[size + at, p] = dot(turns.follows[p, j, size:], z[size:])
+    return found
+
+
+@counting
+def begun(room, eq, turns, state, closed, z):
+    """Return the map that contacts `closed` (u,) and units that stick in states (u,) leave at z (K,)."""
+    units = len(state)
+    rigid, stuck = integers(room, units), integers(room, units)
+    for r in range(units):
+        rigid[r] = 1 if closed[r] and eq.spring[r] == math.inf else 0
+        stuck[r] = 1 if state[r] == STICK and eq.rubs[r] else 0
+    return then(room, held(room, eq, turns, rigid, stuck, z), followed(room, eq, turns, state, z))
+
+
+@counting
+def pressing(room, state):
+    """Return whether units (u,) press, as contacts, in states."""
+    found = integers(room, len(state))
+    for r in range(len(state)):
+        found[r] = 1 if presses(state[r]) else 0
+    return found
+
+
+@counting
+def left(room, eq, turns, M, z, rows, speeds):
+    """Return what numbers and the start do to gaps of contacts (m,) at z, or to speeds of rows: (m, k + P)."""
+    found, first = matrix(room, len(rows), M.shape[1]), M.shape[1] - turns.count
+    one = len(M)
+    for a in range(len(rows)):
+        functional = eq.speed[rows[a]] if speeds else eq.gap[rows[a]]
+        for i in range(one):
+            if functional[i] != 0.0:
+                for c in range(M.shape[1]):
+                    found[a, c] += functional[i] * M[i, c]
+        for p in range(turns.count):
+            found[a, first + p] += own_of(turns, p, rows[a], z, speeds)
+    return found
+
+
+@inlined
+def own_of(turns, p, row, z, speeds):
+    """Return what number p alone changes in a functional at z."""
+    return dot(turns.speed[p, row], z) if speeds else dot(turns.gap[p, row], z)
+
+
+@counting
+def largest(room, eq, M):
+    """Return the largest entry of a derivative (2N, k + P) in units of the sizes of states."""
+    found, of_state = 0.0, vector(room, M.shape[1])
+    for s in range(len(eq.scale)):
+        for c in range(M.shape[1]):
+            of_state[c] = 0.0
+        for i in range(M.shape[0]):
+            if eq.to_state[s, i] != 0.0:
+                for c in range(M.shape[1]):
+                    of_state[c] += eq.to_state[s, i] * M[i, c]
+        for c in range(M.shape[1]):
+            found = max(found, abs(of_state[c]) / eq.scale[s])
+    return found

@@ -14,23 +14,23 @@ The accelerations are those of system.flow.
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.derivatives.frame import Frame
-from vanedamp.coupling.derivatives.minima import least_minimum
 from vanedamp.coupling.derivatives.series import Series
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.response.segment import Segment
 from vanedamp.coupling.system.flow import StateFlow
 from vanedamp.coupling.system.system import System
-from vanedamp.coupling.system.unit_laws import EVENTS, SINGULAR, possible_events, signals_of
+from vanedamp.coupling.system.unit_laws import EVENTS, possible_events, signals_of
 from vanedamp.coupling.tangents.dual import values, zeros
 from vanedamp.files.store import frozen
 
-#: points of a period, and of one turn of the fastest motion, between which least margins are sought; flows kept
-_LOOKS, _TURN, _KEPT = 32, 12, 1000
+#: flows kept
+_KEPT = 1000
 
 
 def _rates(system: System) -> np.ndarray:
@@ -104,6 +104,8 @@ class Dynamics:
         self.tilts = zeros((len(extended), sine.stop))
         self.tilts[:, self.places] = (np.eye(size)[system.tilt[extended]] - system.turn[extended]) / self.unit[:size]
         self._flows: dict[bytes, Flow] = {}
+        #: flows as compiled functions take them (derivatives.equations)
+        self.tables: dict[Any, Any] = {}
 
     @cached_property
     def per(self) -> np.ndarray:
@@ -136,30 +138,6 @@ class Dynamics:
                 self._flows.clear()
             self._flows[key] = Flow(self, state, open_force)
         return self._flows[key]
-
-    def held(self, closed: np.ndarray, stuck: np.ndarray) -> np.ndarray:
-        """Return the projector (2N, 2N) of u, in the metric of mass, that keeps contacts (u,) closed and slips zero.
-
-        Both sides move by forces between them only, which keep their momentum and their centre of mass.
-        """
-        u, size = len(closed), len(self.root)
-        normal, matrix = self.rows[:u][closed], np.eye(2 * size)
-        matrix[self.places, self.places] = self.rate[:, None] * _projector(normal) / self.rate
-        matrix[self.rates, self.rates] = _projector(np.vstack([normal, self.rows[u:][stuck]]))
-        return matrix
-
-    def followed(self, state: np.ndarray) -> np.ndarray:
-        """Return the map (2N, 2N) of u to that with sliders as they are in states (u,).
-
-        Sliders of Jenkins elements that slip follow their driving motion, others rest.
-        """
-        size, matrix = len(self.root), np.eye(2 * len(self.root))
-        slips = state[self.jenkins] != codes.STICK
-        matrix[size + self.sliders] = 0.0
-        for a, follows in zip(self.sliders[slips], self.follows[slips], strict=True):
-            matrix[a, :size], matrix[a, size:] = follows[:size], 0.0
-            matrix[size + a, size:] = follows[size:]
-        return matrix
 
 
 class Flow:
@@ -222,7 +200,7 @@ class Flow:
         return [(r, int(event.code)) for r, event in events if event.order != codes.VELOCITY or not self.slips_held[r]]
 
     @cached_property
-    def _margins(self) -> tuple[np.ndarray, np.ndarray]:
+    def margins(self) -> tuple[np.ndarray, np.ndarray]:
         """The functionals (m, K) of the possible events, each relative to its scale, and their rates."""
         margins = np.zeros((len(self.possible), len(self.X)))
         for margin, (r, what) in zip(margins, self.possible, strict=True):
@@ -232,19 +210,9 @@ class Flow:
         return margins, margins @ self.X
 
     @cached_property
-    def _fastest(self) -> float:
+    def fastest(self) -> float:
         """Largest rate of change of the motion, 1/s."""
         return float(np.abs(np.linalg.eigvals(self.X)).max(initial=0.0))
-
-    def least(self, z: np.ndarray, duration: float, event: tuple[int, int]) -> tuple[float, int, int]:
-        """Return the least margin within a duration of the events that were possible but one, its unit and its code.
-
-        Relative to its scale, where the margin turns inside the segment by more than round-off; inf without any.
-        """
-        step = min(self.dynamics.system.period / _LOOKS, 2 * np.pi / _TURN / (self._fastest or 1.0))
-        without = self.possible.index(event) if event in self.possible else -1
-        least, row = least_minimum(self.series, *self._margins, z, duration, step, without)
-        return (max(least, 0.0), *self.possible[row]) if row >= 0 else (np.inf, -1, 0)
 
 
 @lru_cache(_KEPT)
@@ -252,13 +220,3 @@ def _parts(joined: bytes, size: int) -> np.ndarray:
     """Return numbers (size,) of the parts of what is joined, (size, size) as bytes: the same for many systems."""
     found = connected_components(np.frombuffer(joined, bool).reshape(size, size), directed=False)[1]
     return frozen(found, int)
-
-
-def _projector(rows: np.ndarray) -> np.ndarray:
-    """Return the orthogonal projector onto what vanishes in rows (m, N), dependent or not."""
-    if not len(rows):
-        return np.eye(rows.shape[1])
-    length = np.linalg.norm(rows, axis=1, keepdims=True)
-    _, sizes, right = np.linalg.svd(rows / np.where(length > 0.0, length, 1.0), full_matrices=False)
-    basis = right[sizes > SINGULAR]
-    return np.eye(rows.shape[1]) - basis.T @ basis

@@ -25,6 +25,7 @@ class EventNames:
         first = np.lexsort((np.where(self._contact, 0, system.body), system.surface == CASING, self._contact))
         self._order = first if self._slides.all() else np.arange(len(system.rest))
         self.names = []
+        self._events: dict[tuple[bytes, bytes, bytes], str] = {}
         for r in range(len(system.rest)):
             body, surface, corner = int(system.body[r]), int(system.surface[r]), int(system.corner[r])
             if system.without_body[r]:
@@ -46,6 +47,12 @@ class EventNames:
 
     def event(self, old: np.ndarray, new: np.ndarray, hit: np.ndarray) -> str:
         """Return the name of an event from the states (u,) of the units before and after it and those hit (m,)."""
+        key = old.tobytes(), new.tobytes(), hit.tobytes()
+        if key not in self._events:
+            self._events[key] = self._event(old, new, hit)
+        return self._events[key]
+
+    def _event(self, old: np.ndarray, new: np.ndarray, hit: np.ndarray) -> str:
         hits = {r for r in hit.tolist() if not (self._slides[r] and _alike(old[r]) == codes.CLOSED)}
         parts = [f"impact {self.names[r]}" for r in sorted(hits)]
         for r in self._order[(old != new)[self._order]].tolist():

@@ -48,7 +48,7 @@ class FlowDerivative:
         self.forces[:, s.kept] += carried
         self.forces[:, u + m] -= turned[:, m] * flow.carried[: len(m)] + drag[m] * carried[:, : len(m)]
         self.X = of.turn.copy()
-        self.X[:, rates] = dynamics.followed(flow.state)[rates, rates] @ moved
+        self.X[:, rates] = np.reshape([s.followed(each) for each in moved], moved.shape)
         slips = flow.state[dynamics.jenkins] != codes.STICK
         follows = of.follows[:, slips, rates]
         self.X[:, rates][:, dynamics.sliders[slips]] += follows @ (s.oblique @ flow.free)

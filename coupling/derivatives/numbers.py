@@ -89,6 +89,8 @@ class Numbers:
     scene: Scene
     #: derivatives of the flows that a motion has met (derivatives.flow_derivative)
     flows: dict[Any, Any] = field(default_factory=dict, repr=False)
+    #: the same as compiled functions take them (derivatives.equations)
+    tables: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.paths)

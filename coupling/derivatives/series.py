@@ -6,6 +6,7 @@ z' = X z, and by P numbers of X: Z' = X Z + D z. The series end at round-off, so
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from copy import copy
 from typing import NamedTuple
@@ -13,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import matrix_balance
 
-from vanedamp.coupling.numerics.compiler.jit import entry
+from vanedamp.coupling.numerics.compiler.jit import counting, entry, kernel
 
 #: norm of X, balanced, over a panel, and terms of a series then: 3^32/32! < 1e-19
-_NORM, _TERMS = 3.0, 32
+_NORM, TERMS = 3.0, 32
 #: most panels of a motion whose nodes are kept at once
 _MOST = 200
 #: nodes and weights of Gauss and Legendre on a panel (0 to 1): they integrate the motion and its squares to round-off
@@ -44,7 +45,7 @@ class Series:
         self.X, self.alone = X, self
         # units of the constants, in which stiff springs have loads far above what they move, are no rates
         balanced = np.abs(matrix_balance(X, permute=False)[0])
-        self._norm = float(min(balanced.sum(axis=0).max(), balanced.sum(axis=1).max()))
+        self.norm = float(min(balanced.sum(axis=0).max(), balanced.sum(axis=1).max()))
         rows, columns = np.nonzero(X)
         self._X = rows, columns, X[rows, columns]
         self._set_derivatives(np.zeros((0, *X.shape)))
@@ -77,7 +78,7 @@ class Series:
             z, Z = course.last, course.end
 
     def _panels(self, duration: float) -> int:
-        return max(int(np.ceil(self._norm * abs(duration) / _NORM)), 1)
+        return max(int(np.ceil(self.norm * abs(duration) / _NORM)), 1)
 
     def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Course:
         """Return the motion from z (K,), Z (K, k + P) over a duration, s; at nodes, or without any.
@@ -90,57 +91,80 @@ class Series:
         g = len(places)
         of_z, of_Z = np.empty((panels * g, k)), np.empty((panels * g, k, p))
         z, Z = np.array(z), np.array(Z)
-        room = np.empty((_TERMS, k)), np.empty((_TERMS, k, p))
-        number, *of_D = self._D
-        _advance(*self._X, number + (p - self._numbers), *of_D, z, Z, step, panels, places, *room, of_z, of_Z)
+        room = np.empty((TERMS, k)), np.empty((TERMS, k, p))
+        _advance(*self._X, *self._D, p - self._numbers, z, Z, step, panels, places, *room, of_z, of_Z)
         time = (np.arange(panels)[:, None] + places) * step
         weight = np.tile(_WEIGHTS if nodes else places, panels) * step
         return Course(time.ravel(), weight, of_z, of_Z, z, Z)
 
 
 @entry
-def _advance(  # type: ignore[no-untyped-def]
-    row, column, x, number, at, of, d, z, Z, step, panels, places, a, b, of_z, of_Z
-):
+def _advance(row, column, x, number, at, of, d, first, z, Z, step, panels, places, a, b, of_z, of_Z):
     """Advance z and Z in place over panels; set them at places of each. a, b: room for the terms of the series."""
-    terms, k, p = b.shape
     for panel in range(panels):
-        for i in range(k):
-            a[0, i] = z[i]
-            for n in range(p):
-                b[0, i, n] = Z[i, n]
-        for j in range(1, terms):
-            share = step / j
-            for i in range(k):
-                a[j, i] = 0.0
-                for n in range(p):
-                    b[j, i, n] = 0.0
-            for entry_ in range(len(x)):
-                i, l, value = row[entry_], column[entry_], share * x[entry_]
-                a[j, i] += value * a[j - 1, l]
-                for n in range(p):
-                    b[j, i, n] += value * b[j - 1, l, n]
-            for entry_ in range(len(d)):
-                b[j, at[entry_], number[entry_]] += share * d[entry_] * a[j - 1, of[entry_]]
+        set_terms(row, column, x, number, at, of, d, first, z, Z, step, a, b)
         for place in range(len(places)):
             node = panel * len(places) + place
-            for i in range(k):
-                sum_ = a[terms - 1, i]
-                for j in range(terms - 2, -1, -1):
-                    sum_ = sum_ * places[place] + a[j, i]
-                of_z[node, i] = sum_
-                for n in range(p):
-                    sum_ = b[terms - 1, i, n]
-                    for j in range(terms - 2, -1, -1):
-                        sum_ = sum_ * places[place] + b[j, i, n]
-                    of_Z[node, i, n] = sum_
+            set_sums(a, b, places[place], of_z[node], of_Z[node])
+        set_sums(a, b, 1.0, z, Z)
+
+
+@kernel
+def set_terms(row, column, x, number, at, of, d, first, z, Z, step, a, b):
+    """Set the terms a (t, K) and b (t, K, p) of the series of z and Z over a step.
+
+    x: entries of X at rows and columns; d: of its derivatives by numbers, of which the first has column `first`.
+    """
+    terms, k, p = b.shape[0], len(z), Z.shape[1]
+    for i in range(k):
+        a[0, i] = z[i]
+        for n in range(p):
+            b[0, i, n] = Z[i, n]
+    for j in range(1, terms):
+        share = step / j
         for i in range(k):
-            sum_ = 0.0
-            for j in range(terms - 1, -1, -1):
-                sum_ += a[j, i]
-            z[i] = sum_
+            a[j, i] = 0.0
             for n in range(p):
-                sum_ = 0.0
-                for j in range(terms - 1, -1, -1):
-                    sum_ += b[j, i, n]
-                Z[i, n] = sum_
+                b[j, i, n] = 0.0
+        for entry_ in range(len(x)):
+            i, l, value = row[entry_], column[entry_], share * x[entry_]
+            a[j, i] += value * a[j - 1, l]
+            for n in range(p):
+                b[j, i, n] += value * b[j - 1, l, n]
+        for entry_ in range(len(d)):
+            b[j, at[entry_], first + number[entry_]] += share * d[entry_] * a[j - 1, of[entry_]]
+
+
+@kernel
+def set_sums(a, b, place, z, Z):
+    """Set z and Z to the sums of the series at a place of the step, 0 to 1."""
+    terms = b.shape[0]
+    for i in range(len(z)):
+        sum_ = a[terms - 1, i]
+        for j in range(terms - 2, -1, -1):
+            sum_ = sum_ * place + a[j, i]
+        z[i] = sum_
+        for n in range(Z.shape[1]):
+            sum_ = b[terms - 1, i, n]
+            for j in range(terms - 2, -1, -1):
+                sum_ = sum_ * place + b[j, i, n]
+            Z[i, n] = sum_
+
+
+@kernel
+def panels_of(norm, duration):
+    """Return how many panels a motion over a duration has, whose flow has a norm, 1/s."""
+    return max(math.ceil(norm * abs(duration) / _NORM), 1)
+
+
+@counting
+def follow(flows, f, first, z, Z, duration, a, b):
+    """Advance z (K,) and Z (K, p) of flow f over a duration, s. first: column of the first number, or beyond."""
+    n, d = flows.count[f, 0], flows.count[f, 1] if first < Z.shape[1] else 0
+    panels = panels_of(flows.norm[f], duration)
+    for _ in range(panels):
+        set_terms(
+            flows.row[f, :n], flows.column[f, :n], flows.x[f, :n], flows.number[f, :d], flows.to[f, :d],
+            flows.of[f, :d], flows.d[f, :d], first, z, Z, duration / panels, a, b,
+        )  # fmt: skip
+        set_sums(a, b, 1.0, z, Z)

@@ -2,160 +2,229 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from vanedamp.coupling.derivatives.constraints import Constraints
-from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
-from vanedamp.coupling.derivatives.jump import impact, scaled
-from vanedamp.coupling.derivatives.numbers import Numbers
-from vanedamp.coupling.derivatives.passage import PassageStatus
+from vanedamp.coupling.derivatives.constraints import applied, begun, left, own_of, presses
+from vanedamp.coupling.derivatives.event_functions import generated
+from vanedamp.coupling.derivatives.impact import impact, scaled
+from vanedamp.coupling.derivatives.matrices import (
+    dot,
+    dot_abs,
+    integers,
+    inverse_of_rows,
+    matrix,
+    product,
+    times,
+    vector,
+)
+from vanedamp.coupling.derivatives.saltation import SHUT, SLOW, check_idle, closed_at, worsen
+from vanedamp.coupling.derivatives.walking import GIVEN, GRAZING
 from vanedamp.coupling.numerics.codes import HELD, OPEN, STICK
-from vanedamp.coupling.response.segment import Event, Segment
-from vanedamp.coupling.system.system import FLOOR
-from vanedamp.coupling.system.unit_laws import contacts_of, presses
+from vanedamp.coupling.numerics.compiler.jit import counting
 
-#: gaps this close are closed, relative to the free travel; speeds this slow count as zero, relative to the fastest
-_SHUT, _STILL = 1e-12, 1e-12
 #: a force this close to its bound is at it: relative to its terms, and to what all loads together could make of it
 _NEAR, _ROUND_OFF = 1e-9, 1e-13
 
 
-class Start:
-    """A state (k,) that a passage is to begin with, of a system of these dynamics.
-
-    turns: (k, P) how numbers of the scene change it; None: they do not. given: whether the motion begins so whatever
-    happens: then only what numbers change may make it kink there.
-    """
-
-    def __init__(
-        self, dynamics: Dynamics, state: np.ndarray, numbers: Numbers | None = None, turns: np.ndarray | None = None,
-        given: bool = False,
-    ) -> None:  # fmt: skip
-        #: columns (k + P,) of derivatives whose motions may make a kink: only those by numbers if the start is given
-        self.counts = slice(len(state) if given else 0, None)
-        #: derivative (2N, k + P), as that of a passage, before units that are at rest stop what it would move
-        self.unheld = np.zeros((dynamics.one, 0))
-        self.frame, self.dynamics, self.system, self._given = dynamics.frame, dynamics, dynamics.system, state
-        self._numbers, self._constraints = numbers, Constraints(dynamics, numbers)
-        self._turns = np.zeros((len(state), 0 if numbers is None else len(numbers))) if turns is None else turns
-
-    def closed(self, segment: Segment) -> np.ndarray:
-        """Return whether contacts (u,) are closed as a segment begins, with or without force."""
-        system, u = self.system, len(segment.state)
-        gap, rate = system.rest + system.J[:u] @ segment.q, system.J[:u] @ segment.v
-        # one at rest that parts from now on has been closed until now
-        rests = (gap <= _SHUT * system.play) & (np.abs(rate) <= _STILL * segment.speed)
-        return np.asarray(contacts_of(system) & ((segment.state != OPEN) | rests))
-
-    def derivative(
-        self, event: Event, segment: Segment, flow: Flow, z: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, PassageStatus]:
-        """Return the derivative of u at the start of the first segment, and its defect, if any.
-
-        By the state (2N, k), and by numbers (2N, P). event: at time zero; z: (K,) then. Raises Untrusted
-        (derivatives.jump).
-        """
-        dynamics, status, k = self.dynamics, PassageStatus.OK, len(self._given)
-        u, given = z[: dynamics.one], dynamics.from_state @ self._given
-        M = self._placed(segment, z)
-        n = self.system.modes
+@counting
+def first_derivative(room, eq, turns, flows, walk, trace, f, z):
+    """Return the derivative (2N, C) of z as the first segment begins, in flow f."""
+    one, size, k = len(eq.unit), len(eq.root), len(eq.scale)
+    given = times(room, eq.from_state, walk.given)
+    M = _placed(room, eq, turns, walk, trace, z)
+    far = 0.0
+    for i in range(eq.modes):
+        far = max(far, eq.typical[i])
+    for i in range(eq.modes):
         # of the largest mode: the bodies may move others by more than what the loads let expect of them
-        if np.any(np.abs((u - given)[:n]) > _SHUT * dynamics.typical[:n].max(initial=0.0)):
-            status = PassageStatus.GRAZING  # the structure would begin beyond a stop
-        hit = event.struck[event.impulse[event.struck] != 0.0]
-        rows = dynamics.speed[hit, : dynamics.one]
-        if np.any(np.abs(rows @ given) > _STILL * np.abs(rows) @ np.abs(given)):
-            status = PassageStatus.GRAZING  # an impact at the very start, which another state has a period before
-            w = given[dynamics.rates]
-            jump = impact(self.system, w / dynamics.root, event, segment.speed, self._numbers)
-            M[dynamics.rates] = scaled(dynamics, jump, w, self._numbers)(M[dynamics.rates])
-        if self._begins_at_event(segment, flow, z, M) or self._loose(segment, flow, z, M):
-            status = PassageStatus.GRAZING
-        self.unheld = np.hstack([M[:, :k] * dynamics.scale, M[:, k:]])
-        M = self._constraints.begun(segment.state, self.closed(segment), z)(M)
-        return M[:, :k], M[:, k:], status
+        if abs(z[i] - given[i]) > SHUT * far:
+            worsen(walk, GRAZING)  # the structure would begin beyond a stop
+    meets = False
+    for h in range(trace.first[0], trace.first[1]):
+        r = trace.struck[h]
+        if trace.impulse[0, r] != 0.0:
+            row = eq.speed[r, :one]
+            meets = meets or abs(dot(row, given)) > SLOW * dot_abs(row, given)
+    if meets:
+        worsen(walk, GRAZING)  # an impact at the very start, which another state has a period before
+        v = vector(room, size)
+        for i in range(size):
+            v[i] = given[size + i] / eq.root[i]
+        jump = impact(room, eq, turns, trace, 0, walk.law, v, trace.speed[0])
+        rates, own = scaled(room, eq, turns, jump, given[size:])
+        moved = product(room, rates, M[size:])
+        for i in range(size):
+            for c in range(M.shape[1]):
+                M[size + i, c] = moved[i, c] + (own[i, c - k] if c >= k else 0.0)
+    if _begins_at_event(room, eq, turns, flows, walk, trace, f, z, M) or _loose(
+        room, eq, turns, flows, walk, trace, f, z, M
+    ):
+        worsen(walk, GRAZING)
+    for i in range(one):
+        for c in range(M.shape[1]):
+            walk.unheld[i, c] = M[i, c] * (eq.scale[c] if c < k else 1.0)
+    M = applied(room, begun(room, eq, turns, trace.state[0], closed_at(room, eq, trace, 0), z), M)
+    idle = matrix(room, one, M.shape[1])
+    for i in range(one):
+        for c in range(M.shape[1]):
+            idle[i, c] = eq.from_state[i, c] * eq.scale[c] if c < k else M[i, c]
+            M[i, c] *= eq.scale[c] if c < k else 1.0
+    check_idle(room, eq, turns, walk, trace, 0, idle, z)
+    return M
 
-    def _placed(self, segment: Segment, z: np.ndarray) -> np.ndarray:
-        """Return the derivative (2N, k + P) of u that a run begins with: bodies in walls are moved out of them.
 
-        Springs of friction dampers are unloaded to their bounds.
-        """
-        system, dynamics, k = self.system, self.dynamics, len(self._given)
-        kept, first = np.hstack([np.eye(k), self._turns]), k - len(self.frame.drawn)
-        own, numbers = np.zeros((dynamics.one, self._turns.shape[1])), self._numbers
-        sliding = np.flatnonzero(np.abs(self._given[first:]) > self.frame.longest)
-        kept[first + sliding] = 0.0
-        if numbers is not None:
-            of, sign = numbers.parts, np.sign(self._given[first:][sliding])
-            bound = of.limit[:, dynamics.jenkins] - self.frame.longest * of.tangential
-            kept[first + sliding, k:] = (sign * (bound / system.tangential)[:, sliding]).T
-            own = (of.from_state @ (dynamics.to_state @ z[: dynamics.one])).T
-        slips = 2 * system.modes + np.arange(system.bodies)
-        slip = segment.q[system.along] - system.floor @ segment.q
-        travel = [self.frame.scene.cavity[index].gap for index in system.cavity]
-        pushed = slips[np.abs(slip - self._given[slips]) > _SHUT * np.array(travel)]
-        if len(pushed):
-            # gaps of bodies that were pushed and are closed now stay closed
-            gap = dynamics.gap[:, : dynamics.one] @ dynamics.from_state
-            shut = np.abs(system.rest + system.J[: len(gap)] @ segment.q) <= _SHUT * system.play
-            shut &= np.any(gap[:, pushed] != 0.0, axis=1) & contacts_of(system)
-            kept[pushed] = 0.0
-            opened = gap[shut] @ kept
-            if numbers is not None:
-                opened[:, k:] += dynamics.gap[shut, : dynamics.one] @ own + (numbers.parts.gap[:, shut] @ z).T
-            kept[pushed] = -np.linalg.pinv(gap[np.ix_(shut, pushed)]) @ opened
-        M = dynamics.from_state @ kept
-        M[:, k:] += own
-        return np.asarray(M)
+@counting
+def _placed(room, eq, turns, walk, trace, z):
+    """Return the derivative (2N, k + P) of u that a run begins with: bodies in walls are moved out of them.
 
-    def _begins_at_event(self, segment: Segment, flow: Flow, z: np.ndarray, M: np.ndarray) -> bool:
-        """Return whether a contact parts with a speed, or begins to slip, as the passage begins.
+    Springs of friction dampers are unloaded to their bounds.
+    """
+    k, P, one, sliders, bodies = len(eq.scale), turns.count, len(eq.unit), len(eq.bound), len(eq.along)
+    kept, own, first = matrix(room, k, k + P), matrix(room, one, P), k - sliders
+    for s in range(k):
+        kept[s, s] = 1.0
+        for p in range(P):
+            kept[s, k + p] = walk.turns[s, p]
+    for j in range(sliders):
+        elongation = walk.given[first + j]
+        if abs(elongation) > eq.longest[j]:
+            kept[first + j, first + j] = 0.0
+            for p in range(P):
+                bound = turns.limit[p, eq.jenkins + j] - eq.longest[j] * turns.tangential[p, j]
+                kept[first + j, k + p] = math.copysign(bound / eq.tangential[j], elongation * bound)
+    state = times(room, eq.to_state, z[:one])
+    for p in range(P):
+        for i in range(one):
+            own[i, p] = dot(turns.from_state[p, i], state)
+    pushed, count = integers(room, bodies), 0
+    for b in range(bodies):
+        slip, s = trace.q[0, eq.along[b]] - dot(eq.floor[b], trace.q[0]), 2 * eq.modes + b
+        if abs(slip - walk.given[s]) > SHUT * eq.travel[b]:
+            pushed[count] = s
+            count += 1
+    if count > 0:
+        _push(room, eq, turns, trace, z, kept, own, pushed[:count])
+    found = product(room, eq.from_state, kept)
+    for i in range(one):
+        for p in range(P):
+            found[i, k + p] += own[i, p]
+    return found
 
-        M: (2N, k + P) of the start, which may keep what is to count.
-        """
-        system, u = self.system, len(segment.state)
-        gap = system.rest + system.J[:u] @ segment.q
-        parts = contacts_of(system) & (segment.state == OPEN) & (gap <= _SHUT * system.play) & ~self.closed(segment)
-        slides = (flow.way != 0.0) & ~flow.slips_held & flow.rubs
-        faster = flow.way * (self.dynamics.speed[u:] @ flow.X @ z) > 0.0  # one that stops at once has been at rest
-        slips = slides & faster & (np.abs(system.J[u:] @ segment.v) <= _STILL * segment.speed)
-        if self.counts.start:
-            parts &= self._turned("gap", np.arange(u), z, M)
-            slips &= self._turned("speed", u + np.arange(u), z, M)
-        return bool(np.any(parts | slips))
 
-    def _opens(self, r: int, z: np.ndarray, M: np.ndarray) -> bool:
-        """Return whether motions that count open a contact at the start."""
-        return not self.counts.start or bool(self._turned("gap", np.array([r]), z, M).any())
+@counting
+def _push(room, eq, turns, trace, z, kept, own, pushed):
+    """Let gaps of bodies that were pushed, states (m,) of their slips, stay closed where they are closed now."""
+    k, one, shut = len(eq.scale), len(eq.unit), 0
+    gap, rows = matrix(room, eq.contacts, k), integers(room, eq.contacts)
+    for r in range(eq.contacts):
+        for i in range(one):
+            if eq.gap[r, i] != 0.0:
+                for s in range(k):
+                    gap[shut, s] += eq.gap[r, i] * eq.from_state[i, s]
+        moves = False
+        for m in range(len(pushed)):
+            moves = moves or gap[shut, pushed[m]] != 0.0
+        if moves and abs(eq.rest[r] + dot(eq.J[r], trace.q[0])) <= SHUT * eq.play[r]:
+            rows[shut] = r
+            shut += 1
+        else:
+            for s in range(k):
+                gap[shut, s] = 0.0
+    for m in range(len(pushed)):
+        for c in range(kept.shape[1]):
+            kept[pushed[m], c] = 0.0
+    opened, of_pushed = product(room, gap[:shut], kept), matrix(room, shut, len(pushed))
+    for a in range(shut):
+        for m in range(len(pushed)):
+            of_pushed[a, m] = gap[a, pushed[m]]
+        for p in range(turns.count):
+            opened[a, k + p] += own_of(turns, p, rows[a], z, False)
+            for i in range(one):
+                opened[a, k + p] += eq.gap[rows[a], i] * own[i, p]
+    moved = product(room, inverse_of_rows(room, of_pushed), opened)
+    for m in range(len(pushed)):
+        for c in range(kept.shape[1]):
+            kept[pushed[m], c] = -moved[m, c]
 
-    def _turned(self, what: str, rows: np.ndarray, z: np.ndarray, M: np.ndarray) -> np.ndarray:
-        """Return whether numbers change some functionals (m,), "gap" or "speed", at the start."""
-        functional, own = getattr(self.dynamics, what)[rows], M[:, len(self._given) :]
-        turned = functional[:, : len(own)] @ own
-        if self._numbers is not None:
-            turned = turned + (getattr(self._numbers.parts, what)[:, rows] @ z).T
-        return np.asarray(np.abs(turned).max(axis=1, initial=0.0) > _NEAR * np.abs(functional) @ self.dynamics.typical)
 
-    def _loose(self, segment: Segment, flow: Flow, z: np.ndarray, M: np.ndarray) -> bool:
-        """Return whether a unit begins at rest that nothing keeps there: closed without force, or stuck at its bound.
+@counting
+def _begins_at_event(room, eq, turns, flows, walk, trace, f, z, M):
+    """Return whether a contact parts with a speed, or begins to slip, as the passage begins.
 
-        A body that friction and a contact hold at once needs the contact for what its friction could not hold. M: as in
-        _begins_at_event, and where friction could hold all, only what opens the contact counts.
-        """
-        system, units, unit = self.system, len(segment.state), np.arange(len(segment.state))
-        force = flow.forces @ z
-        noise = _NEAR * np.abs(flow.forces) @ self.dynamics.typical + _ROUND_OFF * flow.possible_forces
-        closed = contacts_of(system) & np.isinf(system.spring) & presses(segment.state)
-        touched = system.J[:units, system.along] != 0.0  # (u, bodies)
-        floors = (unit >= system.contacts) & (system.surface == FLOOR)
-        holds = floors & np.isin(segment.state, (STICK, HELD))
-        for r in np.flatnonzero(closed & (system.friction == 0.0)):
-            room = [system.limit[own].sum() - force[r] - force[units:][own].sum() * system.J[r, system.along[body]]
-                    for body in np.flatnonzero(touched[r]) for own in (holds & (system.body == body),)]  # fmt: skip
-            least, edge = min(room, default=-force[r]), noise[r] + _NEAR * system.limit[holds].max(initial=0.0)
-            if least >= -edge and (least <= edge or self._opens(r, z, M)):
-                return True
-        stuck = flow.stuck & (unit >= system.contacts) & (unit < self.dynamics.jenkins.start)
-        at_bound = stuck & (np.abs(force[units:]) >= (1.0 - _NEAR) * system.limit)
-        beside = [np.any(touched[closed, system.body[r]]) if floors[r] else False for r in unit]
-        return bool(np.any(at_bound & ~np.array(beside, bool)))
+    M: (2N, C) of the start, which may keep what is to count.
+    """
+    units, moving, closed = len(eq.rest), vector(room, len(z)), closed_at(room, eq, trace, 0)
+    generated(flows, f, z, moving)
+    for r in range(units):
+        parts = r < eq.contacts and trace.state[0, r] == OPEN and closed[r] == 0
+        parts = parts and eq.rest[r] + dot(eq.J[r], trace.q[0]) <= SHUT * eq.play[r]
+        way = flows.way[f, r]
+        # one that stops at once has been at rest
+        slips = (
+            way != 0.0 and not flows.slips_held[f, r] and eq.rubs[r] and way * dot(eq.speed[units + r], moving) > 0.0
+        )
+        slips = slips and abs(dot(eq.J[units + r], trace.v[0])) <= SLOW * trace.speed[0]
+        if parts and _turned(room, eq, turns, walk, r, z, M, False):
+            return True
+        if slips and _turned(room, eq, turns, walk, units + r, z, M, True):
+            return True
+    return False
+
+
+@counting
+def _turned(room, eq, turns, walk, row, z, M, speeds):
+    """Return whether motions that count change a functional at the start: any, or by numbers if the start is given."""
+    if not walk.at[GIVEN]:
+        return True
+    rows, k, functional = integers(room, 1), len(eq.scale), eq.speed[row] if speeds else eq.gap[row]
+    rows[0] = row
+    moved, terms = left(room, eq, turns, M, z, rows, speeds), dot_abs(functional, eq.typical)
+    most = 0.0
+    for c in range(k, M.shape[1]):
+        most = max(most, abs(moved[0, c]))
+    return most > _NEAR * terms
+
+
+@counting
+def _loose(room, eq, turns, flows, walk, trace, f, z, M):
+    """Return whether a unit begins at rest that nothing keeps there: closed without force, or stuck at its bound.
+
+    A body that friction and a contact hold at once needs the contact for what its friction could not hold. M: as in
+    _begins_at_event, and where friction could hold all, only what opens the contact counts.
+    """
+    units, bodies, grip = len(eq.rest), len(eq.along), 0.0
+    force, noise, holds = vector(room, 2 * units), vector(room, 2 * units), integers(room, units)
+    for r in range(2 * units):
+        force[r] = dot(flows.forces[f, r], z)
+        noise[r] = _NEAR * dot_abs(flows.forces[f, r], eq.typical) + _ROUND_OFF * flows.most[f, r]
+    for r in range(units):
+        state = trace.state[0, r]
+        if eq.floor_unit[r] and (state == STICK or state == HELD):
+            holds[r], grip = 1, max(grip, eq.limit[r])
+    for r in range(eq.contacts):
+        if not (eq.spring[r] == math.inf and presses(trace.state[0, r]) and eq.friction[r] == 0.0):
+            continue
+        least, touches = math.inf, False
+        for b in range(bodies):
+            lever = eq.J[r, eq.along[b]]
+            if lever == 0.0:
+                continue
+            touches, limit, drag = True, 0.0, 0.0
+            for other in range(units):
+                if holds[other] and eq.body[other] == b:
+                    limit, drag = limit + eq.limit[other], drag + force[units + other]
+            least = min(least, limit - force[r] - drag * lever)
+        least = least if touches else -force[r]
+        edge = noise[r] + _NEAR * grip
+        if least >= -edge and (least <= edge or _turned(room, eq, turns, walk, r, z, M, False)):
+            return True
+    for r in range(eq.contacts, eq.jenkins):
+        if not flows.stuck[f, r] or abs(force[units + r]) < (1.0 - _NEAR) * eq.limit[r]:
+            continue
+        beside = False
+        for other in range(eq.contacts if eq.floor_unit[r] else 0):
+            closed = eq.spring[other] == math.inf and presses(trace.state[0, other])
+            beside = beside or (closed and eq.J[other, eq.along[eq.body[r]]] != 0.0)
+        if not beside:
+            return True
+    return False

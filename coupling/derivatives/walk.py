@@ -1,35 +1,83 @@
-"""One passage of a motion: the segments of a run, and with them the derivative of where they lead."""
+"""One passage of a motion: the course of a run, and with it the derivative of where it leads."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.derivative import Before, Derivative, Guard, begins
 from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.event_names import EventNames
-from vanedamp.coupling.derivatives.flow_derivative import derivative_of
+from vanedamp.coupling.derivatives.flow_table import FlowTable, table_of
 from vanedamp.coupling.derivatives.frame import Frame
-from vanedamp.coupling.derivatives.jump import Untrusted
+from vanedamp.coupling.derivatives.impact import PLASTIC
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStatus
-from vanedamp.coupling.derivatives.start import Start
-from vanedamp.coupling.engine.backends import engine_run
+from vanedamp.coupling.derivatives.passing import end_walk, walk_along
+from vanedamp.coupling.derivatives.saltation import SIMULTANEOUS
+from vanedamp.coupling.derivatives.walking import (
+    COMPLETED,
+    COUNTS,
+    FLOW,
+    GIVEN,
+    KEEPS,
+    KNOWN,
+    LAW_OF,
+    NEAR_CODE,
+    NEAR_UNIT,
+    NEXT,
+    REACHED,
+    SEEKS,
+    SHORT,
+    SMOOTH,
+    STATUS,
+    WANTS_FLOW,
+    WANTS_ROOM,
+)
+from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
+from vanedamp.coupling.engine.run import EventDrivenRun
+from vanedamp.coupling.engine.trace import COUNT, Leg, Trace, leg_of
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import fitted
-from vanedamp.coupling.response.segment import Event, EventRun, Segment, Walk
+from vanedamp.coupling.response.segment import Event
+from vanedamp.coupling.system.restitution import restitutions_at
+from vanedamp.coupling.system.system import System
+from vanedamp.coupling.tangents.differences import NotSmooth, derivative
 
-#: events per period after which a walk gives up: each is a step of Python
+#: events per period after which a walk gives up
 EVENTS_PER_PERIOD = 2000
+_STATUSES = list(PassageStatus)
 
 
-def run_from(frame: Frame, state: np.ndarray, periods: int) -> EventRun:
-    """Return the engine's run over periods that begins with a state (k,)."""
-    system = frame.system
-    start, records = fitted(system, frame.restart_of(state)), new_records(system, periods, 0)
-    return engine_run(system, start, records, True, EVENTS_PER_PERIOD * periods)
+def run_from(frame: Frame, state: np.ndarray, periods: int, earlier: EventDrivenRun | None = None) -> EventDrivenRun:
+    """Return the engine's run over periods that begins with a state (k,).
+
+    earlier: a run that is read no more: it begins again if it is of the same system, or gives its subsystems.
+    """
+    system, start = frame.system, fitted(frame.system, frame.restart_of(state))
+    if earlier is not None and earlier.whole is system and periods < len(earlier.records.peak):
+        earlier.begin_from(start)
+        earlier.max_events = EVENTS_PER_PERIOD * periods
+        return earlier
+    run = engine_run(system, start, new_records(system, periods, 0), False, EVENTS_PER_PERIOD * periods)
+    reuse_subsystems(run, earlier)
+    return run
+
+
+class Before(NamedTuple):
+    """A moment of a motion: its segment, the event that ends it, its flow, z (K,) there, and M (2N, k + P)."""
+
+    segment: Leg
+    event: Event
+    flow: Flow
+    z: np.ndarray
+    M: np.ndarray
+
+    @property
+    def u(self) -> np.ndarray:
+        """The state (2N,) there."""
+        return self.z[: self.flow.dynamics.one]
 
 
 class Watch(Protocol):
@@ -46,7 +94,7 @@ class Watch(Protocol):
     def segment(self, begun: Before, duration: float) -> None:
         """Take the motion over a duration, s, until the next event. begun: its start, with the derivative there."""
 
-    def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
+    def event(self, before: Before, new: Leg, M: np.ndarray, shift: np.ndarray) -> None:
         """Take an event, or a period's end. M: the derivative after it; shift: (k + P,) of its time, s."""
 
     def end(self, before: Before) -> None:
@@ -56,7 +104,8 @@ class Watch(Protocol):
 class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
-    turns: (k, P) how numbers change the start; watch: is called with the course of every segment; given: as in Start;
+    turns: (k, P) how numbers change the start; watch: is called with the course of every segment; given: whether the
+    motion begins so whatever happens: then only what numbers change may make it kink there;
     reached: state (k,) and derivatives (k, k) and (k, P) some part of a period, or periods, after the start, of a
     passage without its derivative only the state; None without a part, or if the engine has not come so far; short:
     whether the passage ends there, its own end unknown.
@@ -67,101 +116,260 @@ class PassageWalk:
         numbers: Numbers | None = None, turns: np.ndarray | None = None, watch: Watch | None = None,
         given: bool = False, part: float = np.inf, short: bool = False,
     ) -> None:  # fmt: skip
-        self._dynamics, self._names, self._whole = dynamics, names, derivative
+        self._dynamics, self._names, self._whole, self._state = dynamics, names, derivative, state
         self._frame, self._numbers, self._watch, self._part, self._short = dynamics.frame, numbers, watch, part, short
-        self._start = Start(dynamics, state, numbers, turns, given)
-        self.derivative = Derivative(dynamics, self._start, numbers)
-        self._crossings, self._clearance = list[Crossing](), (np.inf, "")
+        self._turns, self._given = turns, given
+        self._table = table_of(dynamics, numbers) if derivative else None
+        self._crossings = list[Crossing]()
         self.reached: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        #: whether a chatter was completed, which the engine ends at the last flights of a millionth of a period
+        self.completed = False
 
-    def passage(self, run: EventRun, periods: int) -> Passage:
+    def passage(self, run: EventDrivenRun, periods: int) -> Passage:
         """Walk a run to the end of the periods."""
-        walk, k, made = Walk(run, periods), len(self._dynamics.scale), self.derivative
-        state, derivative = np.full(k, np.nan), np.full((k, k), np.nan)
-        by_number = np.full((k, 0 if self._numbers is None else len(self._numbers)), np.nan)
-        with np.errstate(invalid="ignore"):  # a derivative that is not known is nan
-            before = self._walked(walk)
-            final = run.final() if walk.status is Status.OK and not self._short else None
-            if self._short and self.reached is not None:
-                state, derivative, by_number = self.reached
-            elif before is None or final is None:
-                made.worsen(PassageStatus.STOPPED)
-            else:
-                state = self._frame.state_of(final)
-                if self._watch is not None:
-                    self._watch.end(before)
-                if self._whole:
-                    derivative, by_number = made.end(before, state, periods)
+        k, P = len(self._dynamics.scale), 0 if self._numbers is None else len(self._numbers)
+        state, derivative, by_number = np.full(k, np.nan), np.full((k, k), np.nan), np.full((k, P), np.nan)
+        made = _Made(self._table, self._state, self._turns, self._given, self._watch) if self._table else None
+        if made is not None:
+            made.until(self._part * self._frame.system.period, self._short)
+        status, before = PassageStatus.OK, self._walked(run, periods, made)
+        final = run.final() if run.status is Status.OK and not self._short else None
+        if self._short and self.reached is not None:
+            state, derivative, by_number = self.reached
+        elif final is None or (made is not None and before is None):
+            status = PassageStatus.STOPPED
+        else:
+            state = self._frame.state_of(final)
+            if self._watch is not None:
+                self._watch.end(before)
+            if made is not None and end_walk(*made.records(run.trace), state, float(periods)):
+                derivative, by_number = made.derivatives(before, periods)
+        clearance = (np.inf, "")
+        if made is not None:
+            clearance = made.clearance(self._names)
+            status = max(status, made.status, key=_STATUSES.index)
+            self.completed = made.completed
         peaks = run.records.peak[:periods].copy()
-        return Passage(
-            state, derivative, tuple(self._crossings), self._clearance, made.status, peaks, by_number
-        )  # fmt: skip
+        return Passage(state, derivative, tuple(self._crossings), clearance, status, peaks, by_number)
 
-    def _walked(self, walk: Walk) -> Before | None:
+    def _walked(self, run: EventDrivenRun, periods: int, made: _Made | None) -> Before | None:
         """Walk to the end. Returns the end of the last segment, None without any."""
-        dynamics, part = self._dynamics, self._part * self._frame.system.period
-        before: Before | None = None
-        for segment in walk:
-            assert segment.event is not None
-            flow, u = dynamics.flow(segment.state, segment.open_force), dynamics.state(segment)
-            M = self._next(walk, before, segment, flow, u)
-            z = dynamics.extended(u, segment.time)
-            if segment.start <= part <= segment.start + segment.duration:
-                middle = self._followed(Before(segment, segment.event, flow, z, M), part - segment.start, None)
-                self.reached = dynamics.to_state @ middle.u, *self.derivative.reached(middle, self._part)
-                if self._short:
-                    return middle
-            if not self._whole:
-                before = Before(segment, segment.event, flow, z, M)
-                continue
-            if self._watch is None or self._watch.nears:
-                least, unit, what = flow.least(z, segment.duration, (segment.event.unit, segment.event.what))
-                if least < self._clearance[0]:
-                    self._clearance = least, self._names.possible(unit, what)
-                self.derivative.neared(segment, least)
-            before = self._followed(Before(segment, segment.event, flow, z, M), segment.duration, self._watch)
+        done, before, began = 0, None, None
+        for trace in run.course(periods):
+            if made is not None:
+                made.walk(trace)
+            count = int(trace.at[COUNT]) if made is None else made.done
+            for i in range(done, count):
+                flow = self._flow(trace, i) if made is None else made.flow(i)
+                if began is not None and trace.unit[i] >= 0:
+                    self._cross(trace, i, began, flow, made)
+                began = flow
+                if made is None:
+                    self._part_of(trace, i, flow)
+                    if self._short and self.reached is not None:
+                        return None
+                elif self._watch is not None:
+                    before = self._watched(trace, i, before, flow, made)
+            if made is not None and count:
+                if self.reached is None and made.has_reached:
+                    self.reached = made.reached(self._part)
+                if before is None or self._watch is None:
+                    before = made.before(trace, count - 1)
+                if self._short and self.reached is not None:
+                    return before
+                made.turn()
+            done = 1
         return before
 
-    def _followed(self, begun: Before, duration: float, watch: Watch | None) -> Before:
-        """Return the motion a duration after the start of a segment, s."""
-        series, one, numbers = begun.flow.series, len(begun.M), self._numbers
-        Z = np.zeros((len(begun.z), begun.M.shape[1]))
-        Z[:one] = begun.M
-        if numbers is not None:
-            series = derivative_of(begun.flow, numbers).series
-            Z[one:, Z.shape[1] - len(numbers) :] = numbers.harmonics(self._dynamics, begun.segment.start)[:, one:].T
-        course = series.course(begun.z, Z, duration, False)
-        if watch is not None:
-            watch.segment(begun, duration)
-        return begun._replace(z=course.last, M=course.end[:one])
+    def _watched(self, trace: Trace, i: int, before: Before | None, flow: Flow, made: _Made) -> Before:
+        """Let the watch take event i and segment i. Returns the end of the segment."""
+        begun, watch = made.begun(trace, i), self._watch
+        assert watch is not None
+        if before is None:
+            watch.begin(made.unheld)
+        else:
+            watch.event(before, begun.segment, begun.M, made.shift(i))
+        watch.segment(begun, begun.segment.duration)
+        return made.before(trace, i)
 
-    def _next(self, walk: Walk, before: Before | None, segment: Segment, flow: Flow, u: np.ndarray) -> np.ndarray:
-        """Return the derivative as a segment begins, nan where it is unknown, and keep the event before it."""
-        made, guards = self.derivative, list[Guard]()
-        if before is not None and before.event.unit >= 0:
-            guards = made.guards(before, segment) if self._whole else []
-            name = self._names.event(before.flow.named, flow.named, before.event.struck)
-            if name and (before.event.impulse.any() or not begins(segment)):
-                speed = guards[0].rate if guards else _met(before.event)
-                self._crossings.append(Crossing(segment.start, name, speed, before.event.loss))
-        if not self._whole:
-            return self._dynamics.from_state
-        try:
-            if before is None:
-                M = made.begin(walk.start, segment, flow, u)
-                if self._watch is not None:
-                    self._watch.begin(self._start.unheld)
-                return M
-            M = made.after(before, segment, flow, u, guards)
-        except Untrusted:
-            made.worsen(PassageStatus.UNDETERMINED)
-            M = np.full((len(u), len(made.shift)), np.nan)
-        if before is not None and self._watch is not None:
-            self._watch.event(before, segment, M, made.shift)
-        return M
+    def _flow(self, trace: Trace, i: int) -> Flow:
+        return self._dynamics.flow(trace.state[i].copy(), trace.open_force[i].copy())
+
+    def _cross(self, trace: Trace, i: int, old: Flow, new: Flow, made: _Made | None) -> None:
+        """Keep event i, if it is one by its name."""
+        struck = slice(trace.first[i], trace.first[i + 1])
+        name = self._names.event(old.named, new.named, trace.struck[struck])
+        start = trace.period[i] * self._frame.system.period + trace.time[i]
+        at_start = start <= SIMULTANEOUS * self._frame.system.period
+        if not name or (at_start and not trace.impulse[i].any()):
+            return
+        if made is not None:
+            speed = made.met(i)
+        else:  # that at which the contact meets whose event it is
+            met = trace.before[struck][trace.struck[struck] == trace.unit[i]]
+            speed = float(met[0]) if len(met) else np.nan
+        self._crossings.append(Crossing(float(start), name, speed, float(trace.loss[i])))
+
+    def _part_of(self, trace: Trace, i: int, flow: Flow) -> None:
+        """Keep the state at the part of a period that is wanted, if it lies in segment i."""
+        leg, nothing = leg_of(trace, i, self._frame.system.period), np.zeros((0, 0))
+        after = self._part * self._frame.system.period - leg.start
+        if not 0.0 <= after <= leg.duration:
+            return
+        z = self._dynamics.extended(self._dynamics.state(leg), leg.time)
+        there = flow.series.course(z, np.zeros((len(z), 0)), after, False).last
+        self.reached = self._dynamics.to_state @ there[: self._dynamics.one], nothing, nothing
 
 
-def _met(event: Event) -> float:
-    """Return the speed, m/s, at which the contact meets whose event it is; nan without an impact of that."""
-    met = event.before[event.struck == event.unit]
-    return float(met[0]) if len(met) else np.nan
+class _Made:
+    """The derivative of a passage as it is made in compiled code, with what Python finds for that."""
+
+    def __init__(
+        self, table: FlowTable, state: np.ndarray, turns: np.ndarray | None, given: bool, watch: Watch | None
+    ) -> None:
+        self._table, self._dynamics, self._numbers = table, table.dynamics, table.numbers
+        self._flows = list[Flow]()
+        k, keeps = len(state), watch is not None
+        self._walk = walk = table.walking(keeps)
+        walk.at[:], walk.shifted[:], walk.shift[:], walk.turns[:], walk.reach[:] = 0, 0, 0.0, 0.0, 0.0
+        walk.at[FLOW] = walk.at[LAW_OF] = -1
+        walk.at[COUNTS], walk.at[GIVEN] = (k, 1) if given else (0, 0)
+        walk.at[SEEKS], walk.at[KEEPS], walk.at[SMOOTH] = watch is None or watch.nears, keeps, 1
+        walk.given[:], walk.last[0], walk.took_part[:], walk.clearance[0] = state, -np.inf, -np.inf, np.inf
+        if turns is not None:
+            walk.turns[:] = turns
+        walk.size[:], walk.reach[:, 0] = table.least, table.reach
+
+    def until(self, time: float, short: bool) -> None:
+        """Keep what there is at a time after the start, s; short: and end there."""
+        self._walk.part[0], self._walk.at[SHORT] = time, short
+
+    def records(self, trace: Trace) -> tuple[object, ...]:
+        """Return what compiled functions take."""
+        return self._table.equations, self._table.turns, self._table.stack, trace, self._walk, self._table.room
+
+    def walk(self, trace: Trace) -> None:
+        """Go on to the present end of a course."""
+        walk = self._walk
+        while True:
+            outcome = walk_along(*self.records(trace))
+            # their places may be taken by others later
+            self._flows += [self._table.flows[place] for place in walk.flows[len(self._flows) : walk.at[NEXT]]]
+            if outcome == KNOWN:
+                return
+            if outcome == WANTS_FLOW:
+                self._table.add(walk.wanted, walk.wanted_force)
+            elif outcome == WANTS_ROOM:
+                raise MemoryError("room of derivatives")
+            else:
+                e = int(walk.at[NEXT])
+                walk.at[LAW_OF] = e
+                walk.at[SMOOTH] = _set_slopes(self._dynamics.system, trace, e, walk.law)
+
+    def turn(self) -> None:
+        """Go on with a course whose last segment is the first now."""
+        self._walk.at[NEXT], self._walk.at[LAW_OF], self._flows = 1, -1, self._flows[-1:]
+
+    @property
+    def done(self) -> int:
+        """Segments of the course that have been passed, with the one in which the passage ends."""
+        at = self._walk.at
+        return int(at[NEXT])
+
+    def flow(self, i: int) -> Flow:
+        """Return the flow of segment i."""
+        return self._flows[i]
+
+    def met(self, i: int) -> float:
+        """Return the rate of the event function of event i."""
+        return float(self._walk.met[i])
+
+    def shift(self, i: int) -> np.ndarray:
+        """Return how event i moves in time, (C,) s."""
+        return self._walk.shifts[i].copy()
+
+    @property
+    def unheld(self) -> np.ndarray:
+        """Derivative (2N, C) of the start as it is given."""
+        return self._walk.unheld.copy()
+
+    def begun(self, trace: Trace, i: int) -> Before:
+        """Return the start of segment i."""
+        leg = leg_of(trace, i, self._dynamics.system.period)
+        z = self._dynamics.extended(self._dynamics.state(leg), leg.time)
+        return Before(leg, leg.event, self.flow(i), z, self._walk.begins[i].copy())
+
+    def before(self, trace: Trace, i: int) -> Before:
+        """Return the end of segment i, of those that are not kept the last."""
+        leg, walk, one = leg_of(trace, i, self._dynamics.system.period), self._walk, self._dynamics.one
+        kept = walk.at[KEEPS]
+        z, M = (walk.z_ends[i], walk.ends[i]) if kept else (walk.z, walk.end[:one])
+        return Before(leg, leg.event, self.flow(i), z.copy(), M.copy())
+
+    @property
+    def has_reached(self) -> bool:
+        """Whether the part that is wanted has been passed."""
+        return bool(self._walk.at[REACHED])
+
+    def reached(self, part: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return state (k,) and derivatives (k, k), (k, P) at that part, in periods."""
+        walk, one = self._walk, self._dynamics.one
+        flow = self._flows[int(walk.at[REACHED]) - 1]
+        state = self._dynamics.to_state @ walk.z_reached[:one]
+        return state, *self._after(flow, walk.z_reached, walk.reached[:one], part)
+
+    def derivatives(self, before: Before, periods: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivatives (k, k), (k, P) of the state at the end of periods."""
+        return self._after(before.flow, before.z, before.M, periods)
+
+    def _after(self, flow: Flow, z: np.ndarray, M: np.ndarray, periods: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return derivatives of the state after some periods: by the start (k, k), by numbers (k, P).
+
+        The end moves with the length of a period.
+        """
+        dynamics, k, one = self._dynamics, len(self._dynamics.scale), self._dynamics.one
+        by_state = dynamics.to_state @ M[:, :k] / dynamics.scale
+        if self._numbers is None:
+            return by_state, np.zeros((k, 0))
+        of, rate = self._numbers.parts, (flow.X @ z)[:one]
+        by_number = dynamics.to_state @ (M[:, k:] + np.multiply.outer(rate, periods * of.period))
+        return by_state, (by_number + (of.to_state @ z[:one]).T) / self._numbers.size
+
+    def clearance(self, names: EventNames) -> tuple[float, str]:
+        """Return the smallest distance to an event that did not happen, and its name."""
+        walk = self._walk
+        least = float(walk.clearance[0])
+        if not np.isfinite(least):
+            return np.inf, ""
+        return least, names.possible(int(walk.at[NEAR_UNIT]), int(walk.at[NEAR_CODE]))
+
+    @property
+    def status(self) -> PassageStatus:
+        """Its defect, if any."""
+        return _STATUSES[int(self._walk.at[STATUS])]
+
+    @property
+    def completed(self) -> bool:
+        """Whether a chatter was completed."""
+        return bool(self._walk.at[COMPLETED])
+
+
+def _set_slopes(system: System, trace: Trace, e: int, law: np.ndarray) -> bool:
+    """Set restitutions in an event, and their derivatives by speed and by coefficient. Returns if there are any."""
+    row = slice(trace.first[e], trace.first[e + 1])
+    struck, before, after = trace.struck[row], trace.before[row], trace.after[row]
+    bounces = np.abs(after) > PLASTIC * np.abs(np.concatenate([before, after])).max(initial=0.0)
+    units, approach = struck[bounces], -before[bounces]
+    coefficient, now = system.restitution, restitutions_at(system, units, approach)
+
+    def of_coefficient(factor: float) -> np.ndarray:
+        return restitutions_at(system._replace(restitution=coefficient * factor), units, approach)
+
+    try:
+        by_speed = derivative(lambda factor: restitutions_at(system, units, approach * factor), 1.0, 1.0, now)
+        by_coefficient = derivative(of_coefficient, 1.0, 1.0, now)
+    except NotSmooth:
+        return False
+    law[0, units], law[1, units] = now, by_speed / np.where(approach == 0.0, 1.0, approach)
+    law[2, units] = by_coefficient / np.where(coefficient[units] == 0.0, 1.0, coefficient[units])
+    return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property, partial
 from typing import Any, ClassVar
 
@@ -12,6 +12,7 @@ import numpy as np
 from vanedamp.coupling.engine.columns import STARTS, Columns, repeated
 from vanedamp.coupling.engine.known import IllConditioned, Known, with_place
 from vanedamp.coupling.engine.scenes import CODE, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job
+from vanedamp.coupling.engine.trace import UNTRACED, Trace, clear, new_trace, turned
 from vanedamp.coupling.numerics.codes import (
     DONE,
     EVALUATIONS,
@@ -24,6 +25,7 @@ from vanedamp.coupling.numerics.codes import (
     PERIOD,
     REDUCED,
     SEGMENTS,
+    TRACED,
 )
 from vanedamp.coupling.numerics.tolerances import OPEN_LEDGER
 from vanedamp.coupling.response.evaluation import STATUS_OF, Outcome
@@ -73,10 +75,8 @@ class EventDrivenRun(ABC):
     ) -> None:
         self.whole, self.system, self.records = whole, system, records
         self.keep, self.max_events, self.log = events, max_events, records.log
-        self.chunks: list[np.ndarray] = []
-        self.begun, self.ended, self._since = False, False, START
-        self.listed = 0  # entries of the log, kept or not
-        self.columns, self.job, self.statistics = repeated(whole, system, start), new_job(), UNJUDGED
+        self.statistics, self.trace, self.status = UNJUDGED, UNTRACED, Status.OK
+        self.begin_from(start)
         known, self._empty_flows, to_fill, *of_modes = self.rooms
         self.known, self.flows, self.assembly = known(system), self._empty_flows(system), to_fill(system)
         modes = self.flows.eigenvalue.shape[1]
@@ -86,6 +86,13 @@ class EventDrivenRun(ABC):
             if type(self) not in self._sized:
                 self._sized[type(self)] = self._run.sized(*self._records(), 0, 0)
             self._run = self._sized[type(self)]
+
+    def begin_from(self, start: RestartState) -> None:
+        """Let the run begin, or begin again, from a start: what it has recorded is lost."""
+        self.chunks: list[np.ndarray] = []
+        self.begun, self.ended, self._since = False, False, START
+        self.listed = 0  # entries of the log, kept or not
+        self.columns, self.job = repeated(self.whole, self.system, start), new_job()
 
     @abstractmethod
     def columns_of(
@@ -103,7 +110,7 @@ class EventDrivenRun(ABC):
     def _records(self) -> tuple[Any, ...]:
         return (
             self.job, self.columns, self.system, self.known.stack, self.flows, self.state, self.watched, self.records,
-            self.scratch, self.assembly, *self.statistics,
+            self.scratch, self.assembly, *self.statistics, self.trace,
         )  # fmt: skip
 
     @abstractmethod
@@ -178,6 +185,8 @@ class EventDrivenRun(ABC):
 
     def _keep_log(self) -> None:
         """Take the entries of the log since the last call, if it is kept."""
+        if len(self.trace.time):  # which is read from the log
+            return
         if self.keep and self.counters[LOGGED]:
             self.chunks.append(self.log[: self.counters[LOGGED]].copy())
         self.listed += int(self.counters[LOGGED])
@@ -189,6 +198,28 @@ class EventDrivenRun(ABC):
         code = self.advance(periods, self.max_events) if code == DONE else code
         self.ended = code != DONE
         return STATUS_OF[code]
+
+    def course(self, periods: int) -> Iterator[Trace]:
+        """Run to the end of `periods` from the start. Yield the course whenever it is full, and at the end.
+
+        status: how the run has ended.
+        """
+        self.check()
+        if not len(self.trace.time):
+            self.trace = new_trace(self.whole, self.rows_of_trace(), len(self.log))
+        clear(self.trace)
+        self.begun = True
+        while True:
+            code = self.advance(periods, self.max_events)
+            self.ended, self.status = code not in (DONE, TRACED), STATUS_OF.get(code, Status.OK)
+            yield self.trace
+            if code != TRACED:
+                return
+            turned(self.trace)
+
+    @abstractmethod
+    def rows_of_trace(self) -> np.ndarray:
+        """Return the row (u,) of the engine's system that each unit is."""
 
     def segment(self) -> Segment:
         """Return the motion from the present state on (response.segment.EventRun)."""

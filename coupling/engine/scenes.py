@@ -12,6 +12,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.engine.trace import next_leg, noted
 from vanedamp.coupling.numerics.codes import (
     DONE,
     EVENTS,
@@ -91,8 +92,8 @@ def take_scene(take, job, columns, base, flows, setup, measured):
 
 @kernel
 def run_scene(
-    begin, advance, fill_known, start, is_outside, leave, job, columns, system, subsystems, flows, st, watched,
-    rec, scratch, assembly, setup, loose, held, free, stuck, measured, goal, max_events,
+    begin, advance, fill_known, start, is_outside, leave, note_segment, note_event, job, columns, system, subsystems,
+    flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured, trace, goal, max_events,
 ):  # fmt: skip
     """Go on with the present scene by the functions of its engine; `goal` periods of one that the caller judges.
 
@@ -107,8 +108,8 @@ def run_scene(
         used = st.counters[PERIOD]
         flows.used[:] = 0
         start(system, st, watched, columns, k)
+        _clear(rec, used)
         if at[COUNT] > 0:
-            _clear(rec, used)
             refused = job.codes[k] == OUTSIDE
             if refused or (at[LINKED] != GIVEN and is_outside(system, st, columns, k, at[LINKED], at[LEFT])):
                 return OUTSIDE
@@ -121,11 +122,16 @@ def run_scene(
         code = DONE if begin(system, st, rec, scratch) else UNDECIDED
         at[CODE] = code
     if code == DONE:
-        code = advance(system, flows, st, watched, rec, scratch, goal if at[COUNT] == 0 else at[GOAL], max_events)
+        traced, until, events = len(trace.time) > 0, goal if at[COUNT] == 0 else at[GOAL], max_events
+        if traced:
+            until, events = next_leg(note_segment, system, flows, st, watched, scratch, trace)
+        code = advance(system, flows, st, watched, rec, scratch, until, events)
         if code == NEEDS_FLOW:
             code = fill_known(system, subsystems, st, flows, assembly)
             if code == DONE:
                 return ON
+        if traced:
+            return noted(note_event, system, st, watched, rec, scratch, trace, code, goal, max_events, ON)
     if at[COUNT] == 0 or code == NEEDS_FLOW:
         return code
     if code == PAUSED:

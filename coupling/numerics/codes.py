@@ -45,11 +45,11 @@ STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
 # why a compiled run returns: all periods are done, it needs something, it lets Python empty the log and see interrupts
 # (PAUSED), or it has ended (response.evaluation.STATUS_OF); of a run whose periods are done: whether it is not steady,
 # is to be made longer, or knows its mean too little (UNCERTAIN); OUTSIDE: a scene begins beyond a wall, and Python
-# moves its bodies or refuses it
+# moves its bodies or refuses it; TRACED: a course is full, and Python reads it
 (
     DONE, NEEDS_FLOW, PAUSED, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED, DIVERGED, PENETRATION,
-    NOT_STEADY, LONGER, OUTSIDE, UNCERTAIN,
-) = range(40, 53)  # fmt: skip
+    NOT_STEADY, LONGER, OUTSIDE, UNCERTAIN, TRACED,
+) = range(40, 54)  # fmt: skip
 
 # counters of a run, of any method
 (

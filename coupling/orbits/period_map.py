@@ -20,7 +20,7 @@ from vanedamp.coupling.derivatives.numbers import Numbers, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.symmetry import Symmetry
 from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, run_from
-from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
+from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.model_order.choices import Choices, choices_of, with_choices
 from vanedamp.coupling.orbits.orbit_quantities import exponents_of, quantities_of
@@ -116,9 +116,7 @@ class PeriodMap:
         self, state: np.ndarray, periods: int, derivative: bool, part: float = np.inf, short: bool = False
     ) -> tuple[Passage, tuple[np.ndarray, np.ndarray, np.ndarray] | None]:
         """Return a passage from a state (k,), and state and derivatives at a part of a period; short: it ends there."""
-        run = run_from(self._frame, state, periods)
-        for earlier in self._earlier:
-            reuse_subsystems(run, earlier)
+        run = run_from(self._frame, state, periods, *self._earlier)
         self._earlier[:] = [run]
         numbers = self._numbers if derivative else None
         walk = PassageWalk(self.dynamics, self._event_names, state, derivative, numbers, part=part, short=short)

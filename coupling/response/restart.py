@@ -153,13 +153,13 @@ def _inside(system: System, state: RestartState) -> RestartState:
     u, still = system.contacts, np.zeros(system.bodies)
     flat = {"slip": still} | (dict.fromkeys(("lift", "tilt"), still) if system.in_plane else {})
     J, rest = system.J[:u], system.rest[:u]
-    middle = rest + J @ motion_of(system, replace(state, **flat)).q
-    shifts = J @ motion_of(system, replace(state, displacement=0.0 * state.displacement)).q
     same = state.gap == system.travels if len(state.gap) == u else False
     fixed = (np.isfinite(system.spring[:u]) & same) | ~J[:, system.modes :].any(axis=1)
-    over = ~fixed & (middle + shifts < -_ROUND_OFF * system.play[:u])
+    over = ~fixed & (rest + J @ motion_of(system, state).q < -_ROUND_OFF * system.play[:u])
     if not over.any():
         return state
+    middle = rest + J @ motion_of(system, replace(state, **flat)).q
+    shifts = J @ motion_of(system, replace(state, displacement=0.0 * state.displacement)).q
     moved = {name: np.array(getattr(state, name)) for name in flat}
     if not system.in_plane:
         moved["slip"] = _pushed(J[:, system.along], middle, fixed, moved["slip"])

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.linalg import null_space
 
-from vanedamp.coupling.derivatives.derivative import Before
 from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
 from vanedamp.coupling.derivatives.flow_derivative import derivative_of
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.series import Course
+from vanedamp.coupling.derivatives.walk import Before
+from vanedamp.coupling.engine.trace import Leg
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.response.segment import EventRun, Segment
+from vanedamp.coupling.response.segment import EventRun
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.sensitivity.integrands import (
     POWERS,
@@ -87,7 +88,7 @@ class Measures:
         """Take the motion until the next event."""
         self._begun = begun._replace(segment=begun.segment._replace(duration=duration))
 
-    def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
+    def event(self, before: Before, new: Leg, M: np.ndarray, shift: np.ndarray) -> None:
         """Take an event, or a period's end, and what led there."""
         boundary = before.event.unit < 0
         moves = new.period * self.numbers.parts.period if boundary else shift[self._k :]
@@ -193,7 +194,7 @@ class Measures:
         system, of = self.dynamics.system, self.numbers.parts
         return Dual(system.omega, -of.period * system.omega / system.period)
 
-    def _struck(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
+    def _struck(self, before: Before, new: Leg, M: np.ndarray, shift: np.ndarray) -> None:
         """Take what impacts do: their speeds, and the energy that they take."""
         dynamics, event, of, k = self.dynamics, before.event, self.numbers.parts, self._k
         w, w_after = before.u[dynamics.rates], dynamics.state(new)[dynamics.rates]

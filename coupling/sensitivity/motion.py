@@ -92,7 +92,7 @@ class Motion:
         if watch is not None:
             watch.run = run
         passage = walk.passage(run, periods)
-        self.completed = walk.derivative.completed
+        self.completed = walk.completed
         return passage
 
     def along(self, passed: Passed, turns: np.ndarray, measures: Measures) -> None:

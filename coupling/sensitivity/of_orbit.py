@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import matrix_balance, svd
 
-from vanedamp.coupling.derivatives.derivative import TANGENTIAL
+from vanedamp.coupling.derivatives.event_functions import TANGENTIAL
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL
 from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.derivative import Before
-from vanedamp.coupling.derivatives.walk import Watch
-from vanedamp.coupling.response.segment import EventRun, Segment
+from vanedamp.coupling.derivatives.walk import Before, Watch
+from vanedamp.coupling.engine.trace import Leg
+from vanedamp.coupling.response.segment import EventRun
 
 #: returns a derivative (..., k + P) with that by the start added to those by the numbers
 _Moved = Callable[[np.ndarray], np.ndarray]
@@ -43,7 +43,7 @@ class Passed:
         """Take the motion until the next event."""
         self._told.append(lambda watch, moved: watch.segment(begun._replace(M=moved(begun.M)), duration))
 
-    def event(self, before: Before, new: Segment, M: np.ndarray, shift: np.ndarray) -> None:
+    def event(self, before: Before, new: Leg, M: np.ndarray, shift: np.ndarray) -> None:
         """Take an event, or a period's end, and what led there."""
         self._told.append(lambda watch, moved: watch.event(
             before._replace(M=moved(before.M)), new, moved(M), moved(shift)

@@ -94,6 +94,10 @@ class EngineRun(EventDrivenRun):
             except IllConditioned as error:
                 raise InputError(f"structure: {error}; change its damping slightly") from None
 
+    def rows_of_trace(self) -> np.ndarray:
+        """Return the rows of the units."""
+        return self._rows
+
     def _segment(self) -> Segment:
         # roots of other segments do not apply
         self.watched.status[int(self.counters[CARRIED]) :] = BOUNDED

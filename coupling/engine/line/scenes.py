@@ -9,6 +9,7 @@ from vanedamp.coupling.engine.line.automaton import advance, begin
 from vanedamp.coupling.engine.line.flow_assembly import fill, is_closed_as
 from vanedamp.coupling.engine.line.gap_kinematics import rigid
 from vanedamp.coupling.engine.line.recording import structure_state
+from vanedamp.coupling.engine.line.tracing import note_event, note_segment
 from vanedamp.coupling.engine.scenes import ON, PLACE, run_scene, take_numbers, take_scene
 from vanedamp.coupling.numerics.codes import COAST, DONE, OPEN
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
@@ -19,7 +20,7 @@ from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 @entry
 def run(
     job, columns, base, subsystems, flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck,
-    measured, goal, max_events,
+    measured, trace, goal, max_events,
 ):  # fmt: skip
     """Run a scene to the end of `goal` periods, or all scenes of a job.
 
@@ -29,8 +30,9 @@ def run(
         k = job.at[PLACE]
         system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
         code = run_scene(
-            begin, advance, _fill_known, _set_start, _is_outside, _leave, job, columns, system, subsystems,
-            flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured, goal, max_events,
+            begin, advance, _fill_known, _set_start, _is_outside, _leave, note_segment, note_event, job, columns,
+            system, subsystems, flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured,
+            trace, goal, max_events,
         )  # fmt: skip
         if code != ON:
             return code

@@ -74,6 +74,10 @@ class PlanarRun(EventDrivenRun):
         if self.system is earlier.system or all(alike):
             self.flows = earlier.flows
 
+    def rows_of_trace(self) -> np.ndarray:
+        """Return the units."""
+        return np.arange(len(self.whole.rest))
+
     def _segment(self) -> Segment:
         self.watched.status[:] = BOUNDED  # roots of other segments do not apply
         st, flows = self.state, self.flows

@@ -7,6 +7,7 @@ import math
 from vanedamp.coupling.engine.known import add_known
 from vanedamp.coupling.engine.plane.automaton import advance, begin
 from vanedamp.coupling.engine.plane.flow_assembly import fill, is_in_states
+from vanedamp.coupling.engine.plane.tracing import note_event, note_segment
 from vanedamp.coupling.engine.scenes import ON, PLACE, copy, run_scene, take_numbers, take_scene
 from vanedamp.coupling.numerics.codes import DONE, LEAVING, OPEN, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
@@ -18,7 +19,7 @@ from vanedamp.coupling.system.unit_kinematics import gap, is_compliant
 @entry
 def run(
     job, columns, base, subsystems, flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck,
-    measured, goal, max_events,
+    measured, trace, goal, max_events,
 ):  # fmt: skip
     """Run a scene to the end of `goal` periods, or all scenes of a job.
 
@@ -29,8 +30,9 @@ def run(
         system = changed(changed(base, "omega", columns.omega[k]), "period", columns.period[k])
         system = changed(changed(system, "moment", columns.moment[k]), "speed", columns.speed[k])
         code = run_scene(
-            begin, advance, _fill_known, _set_start, _is_outside, _leave, job, columns, system, subsystems,
-            flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured, goal, max_events,
+            begin, advance, _fill_known, _set_start, _is_outside, _leave, note_segment, note_event, job, columns,
+            system, subsystems, flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured,
+            trace, goal, max_events,
         )  # fmt: skip
         if code != ON:
             return code

@@ -39,7 +39,9 @@ _NOT_FROM_PYTHON = {"no_cpython_wrapper": True}
 _STRICT = _OPTIONS | {"fastmath": False}
 
 # marks of files that enter compiled code: functions, and records, whose fields have their places there
-_MARKS = ("@entry", "@kernel", "@inlined", "@summing", "@comparing", "@strict", "@intrinsic", "(NamedTuple)")
+_MARKS = (
+    "@entry", "@kernel", "@counting", "@inlined", "@summing", "@comparing", "@strict", "@intrinsic", "(NamedTuple)",
+)  # fmt: skip
 _PACKAGE = Path(__file__).parents[3]
 
 
@@ -59,6 +61,10 @@ summing: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contra
 comparing: _Decorator = njit(
     **_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, **COMPILERS["loops"]
 )
+
+
+#: a kernel that returns parts of arrays, whose references are counted
+counting: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"_nrt": True}, **COMPILERS["kernel"])
 
 
 class CacheError(VanedampError):
@@ -100,6 +106,11 @@ def entry(function: Callable[..., Any]) -> Any:
     return Entry(function, _OPTIONS)
 
 
+def counting_entry(function: Callable[..., Any]) -> Any:
+    """Compile a function as `counting` that Python calls, and compiled functions may."""
+    return function if config.DISABLE_JIT else Entry(function, _OPTIONS | {"_nrt": True})  # type: ignore[attr-defined]
+
+
 def strict_entry(function: Callable[..., Any]) -> Any:
     """Compile a function as `strict` that Python calls, and compiled functions may."""
     return function if config.DISABLE_JIT else Entry(function, _STRICT)  # type: ignore[attr-defined]
@@ -125,7 +136,8 @@ def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         )  # fmt: skip
     except (AttributeError, ImportError, TypeError):  # another numba: nothing is kept, as its date would not do
         return njit(**options, **COMPILERS["entry"])(function)
-    if hasattr(kept, "_load_overload"):
+    # references are counted by what numba makes ready as it loads all that it could compile
+    if hasattr(kept, "_load_overload") and not options["_nrt"]:
         kept.load_overload = partial(_load, kept)
     return compiled
 

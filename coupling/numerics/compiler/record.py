@@ -20,6 +20,7 @@ import numpy as np
 from llvmlite import ir
 from numba import typeof, types
 from numba.core import cgutils
+from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
@@ -160,7 +161,8 @@ def _get(context, builder, type, value, name):
     place = cgutils.gep_inbounds(builder, value, 0, list(type.fields).index(name))
     loaded = _load(builder, place, builder.module.add_metadata([]))
     whole = context.data_model_manager[field].from_data(builder, loaded)
-    return whole if length is None else _with_lengths(context, builder, field, whole, length)
+    whole = whole if length is None else _with_lengths(context, builder, field, whole, length)
+    return impl_ret_borrowed(context, builder, field, whole)
 
 
 def _with_lengths(context: Any, builder: Any, field: Any, value: Any, shape: Sequence[int | None]) -> Any:
