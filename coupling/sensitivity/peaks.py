@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,12 +21,25 @@ _SAME, _AGREE = 1e-9, 1e-6
 Found = list[tuple[float, np.ndarray]]
 
 
+class Height(NamedTuple):
+    """A value with its derivatives (P,), and whether the motion is highest there.
+
+    It is not where an event happens on its way up or down. Close to a summit such a height is as large, within what
+    counts as one height, but moves with its event: neither are its derivatives those of the summit, nor do they make a
+    kink.
+    """
+
+    value: float
+    turns: np.ndarray
+    summit: bool
+
+
 def largest(found: Found, number: int) -> tuple[Dual, bool]:
     """Return the largest, 0 of none, and whether others as large part from it: its derivatives hold on one side."""
-    value = max((each for each, _ in found), default=0.0)
-    turned = np.array([turns for each, turns in found if each >= value - _SAME * abs(value)] or [np.zeros(number)])
+    value, own = max(found, key=lambda each: each[0], default=(0.0, np.zeros(number)))
+    turned = np.array([turns for each, turns in found if each >= value - _SAME * abs(value)] or [own])
     apart = np.ptp(turned, axis=0) > _AGREE * (np.abs(turned).max(initial=0.0) + abs(value))
-    return Dual(value, turned[0]), bool(apart.any())
+    return Dual(value, own), bool(apart.any())
 
 
 def top_of(each: Dual) -> tuple[Dual, bool]:
@@ -42,7 +56,7 @@ class Swing:
     def __init__(self, functional: Functionals, deflected: bool) -> None:
         self.functional, self.deflected, self._number = functional, deflected, len(functional.own)
         #: values upwards and downwards of each period
-        self.found: list[tuple[Found, Found]] = []
+        self.found: list[tuple[list[Height], list[Height]]] = []
         self.integral = Dual(0.0, np.zeros(self._number))
 
     def passed(
@@ -53,20 +67,31 @@ class Swing:
         while len(self.found) <= period:
             self.found.append(([], []))
         (z, Z, _), row = ends[0], self.functional.rows[0]
-        for z_end, Z_end, moves in ends:
-            value, turns = self.functional.of(z_end[None], Z_end[None])
-            turned = turns[0, 0] + float(row @ series.X @ z_end) * moves
-            for sign, found in zip((1.0, -1.0), self.found[period], strict=True):
-                found.append((sign * float(value[0, 0]), sign * turned))
+        begins, stops = (self._end(series, *each) for each in ends)
+        for sign, found in zip((1.0, -1.0), self.found[period], strict=True):
+            start, end = (
+                Height(sign * value, sign * turns, way * sign * rate >= 0.0)
+                for way, (value, turns, rate) in ((-1.0, begins), (1.0, stops))
+            )
+            if found:  # the end of the segment before: to be highest there, the motion comes up and goes down
+                start = start._replace(summit=start.summit and found[-1].summit)
+                found[-1] = found[-1]._replace(summit=start.summit)
+            found += [start, end]
         x = course.z @ row
         size = np.ptp(x) if self.deflected else np.abs(x).max(initial=0.0)
         for sign, found in zip((1.0, -1.0), self.found[period], strict=True):
             others = found if self.deflected else [*self.found[period][0], *self.found[period][1]]
-            least = max((value for value, _ in others), default=-np.inf) - _NEAR * size
+            least = max((each.value for each in others), default=-np.inf) - _NEAR * size
             for at in _summits(sign * row, series, course, duration, least):
                 there = series.course(z, Z, at, False)
                 value, turns = self.functional.of(there.last[None], there.end[None])
-                found.append((sign * float(value[0, 0]), sign * turns[0, 0]))
+                found.insert(-1, Height(sign * float(value[0, 0]), sign * turns[0, 0], True))
+
+    def _end(self, series: Series, z: np.ndarray, Z: np.ndarray, moves: np.ndarray) -> tuple[float, np.ndarray, float]:
+        """Return the value at an end of a segment, its derivatives (P,), and its rate. Arguments as in `passed`."""
+        value, turns = self.functional.of(z[None], Z[None])
+        rate = float(self.functional.rows[0] @ series.X @ z)
+        return float(value[0, 0]), turns[0, 0] + rate * moves, rate
 
     def integrate(self, weight: np.ndarray, edges: np.ndarray, z: np.ndarray, Z: np.ndarray) -> None:
         """Take the integral over a segment: see Measures._integrate."""
@@ -75,11 +100,15 @@ class Swing:
 
     def distances(self, mean: Dual, first: int = 0) -> tuple[Dual, bool]:
         """Return the largest distances (n,) from a value in periods from `first` on, and whether there are kinks."""
-        found = [
-            largest([(value - way * float(mean.value), turns - way * mean.turns)
-                     for way, values in ((1.0, up), (-1.0, down)) for value, turns in values], self._number)
-            for up, down in self.found[first:]
-        ]  # fmt: skip
+        found = []
+        for up, down in self.found[first:]:
+            each = [
+                (value - way * float(mean.value), turns - way * mean.turns, summit)
+                for way, heights in ((1.0, up), (-1.0, down)) for value, turns, summit in heights
+            ]  # fmt: skip
+            most = max((value for value, _, _ in each), default=0.0)
+            highest = [(value, turns) for value, turns, summit in each if summit or value == most]
+            found.append(largest(highest, self._number))
         return joined([height for height, _ in found], self._number), any(apart for _, apart in found)
 
 

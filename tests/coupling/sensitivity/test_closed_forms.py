@@ -86,6 +86,37 @@ def test_a_reset_moves_the_end_back(restitution):
     assert by_restitution == pytest.approx(-0.6, rel=CLOSE)
 
 
+def shaken(before, **excitation):
+    """A base that moves by sin(omega t), whose first summit a body's first impact precedes by an angle, rad."""
+    omega, gap, speed = 2 * math.pi, 8.0, 8.0
+    time = (math.pi / 2 - before) / omega
+    return scene(
+        structure={"model": "prescribed", "displacement_amplitude": 1.0}, excitation={"frequency": 1.0} | excitation,
+        gravity={"acceleration": 0.0}, cavity=[{"name": "c", "gap": gap}], time={"periods": 1, "transient": 0},
+        damper=[{"cavity": "c", "mass": 1.0, "restitution": 0.5, "velocity": speed - omega,
+                 "position": gap / 2 - speed * time + math.sin(omega * time)}],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("before", [3e-5, -3e-5, 1e-6])
+def test_an_event_next_to_a_summit_does_not_move_the_summit(before):
+    """The base has its amplitude, whatever the body does; its height at the impact, before^2/2 below, does not."""
+    found = vd.sensitivity(shaken(before), ("structure.displacement_amplitude", "damper.0.position", "cavity.c.gap"))
+    assert (found.status, found.note) == ("ok", "")
+    assert math.pi / 2 - 2 * math.pi * found.impact_time[0] == pytest.approx(before, rel=1e-8)
+    assert found.peak == pytest.approx([1.0], rel=1e-14)
+    for derivative in (found.peak_derivative[0], found.derivatives["amplitude_max"]):
+        assert derivative == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_two_summits_of_one_height_part():
+    """sin(omega t) + 0.2 sin(2 omega t + phase) is as high as it is deep at phase 0: one of both grows, one shrinks."""
+    found = vd.sensitivity(
+        shaken(0.5, harmonic=[{"order": 2, "amplitude": 0.2, "phase": 0.0}]), ["excitation.harmonic.0.phase"]
+    )
+    assert found.status == "ok" and found.note.startswith("summits of one height part")
+
+
 BALL = {
     "amplitude": "structure.displacement_amplitude", "frequency": "excitation.frequency",
     "gravity": "gravity.acceleration", "restitution": "damper.0.restitution",
