@@ -32,6 +32,9 @@ _CARRIED = 1e-3
 _NO_SHARE = 1e-9
 #: motions of floors, relative to the response's, that count as zero
 _ROUND_OFF = 1e-12
+#: amplitude of order 1, over the largest displacement that there is, or that the exchanged energy could make, below
+#: which it is round-off
+_STANDS = 1e-12
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -44,6 +47,7 @@ class Measured(NamedTuple):
     load: Annotated[np.ndarray, "e N", complex]  # N
     table: Annotated[np.ndarray, "e", complex]  # displacements of a prescribed base, m
     squares: Annotated[np.ndarray, "n"]  # squared angular frequencies of the structure
+    response: Annotated[np.ndarray, "N"]  # functional of the response
     mass: Annotated[np.ndarray, "N"]  # kg
     along: Annotated[np.ndarray, "b", int]  # coordinate of each body
     holds: Annotated[np.ndarray, "b"]  # friction that holds a body on its floor, N
@@ -67,8 +71,8 @@ def measured_of(scene: Scene, system: System) -> Measured:
     excitation = scene.excitation
     return Measured(
         clock=np.array([system.omega, system.period]), frequency=system.frequency, load=system.load,
-        table=system.table, squares=system.squares, mass=system.mass, along=system.along, holds=system.holds,
-        rest=system.rest, play=system.play, J=system.J, body=system.body, other=system.other,
+        table=system.table, squares=system.squares, response=system.response, mass=system.mass, along=system.along,
+        holds=system.holds, rest=system.rest, play=system.play, J=system.J, body=system.body, other=system.other,
         lies=~system.across & ~system.without_body[:c] & np.isinf(system.spring[:c]),
         rolls=np.array([damper.form.rolls for damper in scene.damper], bool), fixed=~moves.any(axis=1),
         orders=excitation.waveform is not None or bool(excitation.distributed),
@@ -110,7 +114,7 @@ def measure(measured, records, first, done, confidence, sums):
         exchanged = max(exchanged, records.collided[i])
     sums[UNBALANCED] = imbalance(records.ledger, records.parts, done, exchanged)
     sums[MADE] = contact_gain(records.ledger, records.parts, first, done, exchanged)
-    _carry(measured, harmonic, count, sums)
+    _carry(measured, harmonic, count, exchanged, sums)
     _set_scale(measured, records.section, first, done)
     if sums[IMPACTS] > 0.0:
         return repetition(records.section, first, done, measured.scale)
@@ -227,19 +231,31 @@ def _set_scale(measured, section, first, done):
 
 
 @strict
-def _carry(measured, harmonic, count, sums):
+def _carry(measured, harmonic, count, exchanged, sums):
     """Set the loads on the bodies and their mass; nan where no attached mass is felt.
 
-    A structure that does not move feels none: its harmonic is 0, or the remainder of a decayed start. Of several
-    harmonics, order 1 counts; nothing is known where it is not excited.
+    A structure that does not move feels none: its harmonic is 0, the remainder of a decayed start, or the round-off of
+    a place where friction holds it against its loads. Of several harmonics, order 1 counts; nothing is known where it
+    is not excited.
     """
-    small = 2.0 / (sums[PERIODS] * sums[SPAN]) * math.hypot(harmonic.real, harmonic.imag) <= math.sqrt(_TINY)
+    amplitude = 2.0 / (sums[PERIODS] * sums[SPAN]) * math.hypot(harmonic.real, harmonic.imag)
+    small = amplitude <= max(math.sqrt(_TINY), _STANDS * max(sums[PEAK], _reach(measured, exchanged)))
     for i in measured.along:
         sums[LOAD] += measured.load[0, i].real
         sums[LOAD + 1] += measured.load[0, i].imag
         sums[CARRIED] += measured.mass[i]
     if len(measured.along) == 0 or small or count == 0 or (measured.orders and _without_first(measured)):
         sums[CARRIED] = np.nan
+
+
+@strict
+def _reach(measured, energy):
+    """Return the largest displacement of the response that an energy (J) could make, m; 0 of a prescribed one."""
+    yields = 0.0
+    for i in range(len(measured.squares)):
+        part = measured.response[i]
+        yields += part * part / max(measured.squares[i], measured.clock[0] * measured.clock[0])
+    return math.sqrt(2.0 * energy * yields)
 
 
 @strict

@@ -7,6 +7,7 @@ from tests.tools.closed_form_scenes import ball, one_to_one, period_one_start, r
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.linear_response import receptance
 from vanedamp.files.toml_input import InputError, validate
 
@@ -143,6 +144,37 @@ def test_a_structure_at_rest_feels_no_mass():
     response = simulate(decay.replace({"structure.damping_ratio": 0.2, "time.transient": 580, "time.periods": 585}))
     assert response.status is Status.OK
     assert response.attached_mass_fraction is None
+
+
+def held(displacement=5e-5, **changes):
+    """A structure that friction holds beside its centre: load, spring and a body that slides on it pull with 0.9 N."""
+    return rubbing(
+        10.0, 0.3, initial={"displacement": displacement}, gravity={"acceleration": 0.0},
+        cavity=[{"name": "c", "gap": 4.0}], time={"periods": 5, "transient": 0},
+        damper=[{"cavity": "c", "mass": 0.1, "restitution": 0.5, "friction": 0.5, "normal_load": 0.2, "velocity": 1.0}],
+        **changes,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("displacement", [5e-5, 1e-14])
+def test_a_structure_that_friction_holds_feels_no_mass(displacement):
+    """It stays where it is: what order 1 has of that is round-off."""
+    response = simulate(held(displacement))
+    assert response.status is Status.OK
+    assert response.amplitude_max == pytest.approx(displacement, rel=1e-12)
+    assert response.amplitude_harmonic < 1e-14 * displacement
+    assert response.slip[-1, 0] == pytest.approx(0.375, rel=1e-12)  # 1/2 - 1/8: the body is slowed down by 1 m/s^2
+    assert response.attached_mass_fraction is None
+    together = sweep(held(displacement, sweep={"excitation.force": [0.1, 0.3]}))
+    assert np.isnan(together.attached_mass_fraction).all()
+
+
+def test_attached_mass_has_no_smallest_amplitude():
+    """A stuck body counts in full however small all of the motion is."""
+    small = cluster(excitation={"frequency": 2400.0, "resonance_amplitude": 1e-35}, damper=[
+        {"cavity": "c1", "mass": 0.02, "friction": 1.0, "normal_load": 1e6, "restitution": 0.7}
+    ], time={"periods": 3000, "transient": 2900})  # fmt: skip
+    assert simulate(small).attached_mass_fraction == pytest.approx(1.0, rel=1e-9)
 
 
 def test_free_decay_is_closed_form():
