@@ -13,6 +13,7 @@ import numpy as np
 
 from vanedamp.coupling.derivatives.matrices import (
     add_product,
+    copy,
     dot,
     integers,
     inverse_of_rows,
@@ -21,6 +22,7 @@ from vanedamp.coupling.derivatives.matrices import (
     unit,
     vector,
 )
+from vanedamp.coupling.derivatives.walking import SPEEDS
 from vanedamp.coupling.numerics.codes import CLOSED, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
 from vanedamp.coupling.numerics.compiler.jit import counting, inlined
 
@@ -49,7 +51,7 @@ def slips(state):
 def identity(room, eq, turns):
     """Return the map that changes nothing."""
     size = len(eq.root)
-    return Map(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.count))
+    return Map(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.numbers))
 
 
 @counting
@@ -95,11 +97,12 @@ def held(room, eq, turns, closed, stuck, z):
     for r in range(units):
         if closed[r]:
             rows[n] = r
-            normal[n], both[n] = eq.rows[r], eq.rows[r]
+            copy(normal[n], eq.rows[r])
+            copy(both[n], eq.rows[r])
             n += 1
         if stuck[r]:
             rows[m] = units + r
-            both[m] = eq.rows[units + r]
+            copy(both[m], eq.rows[units + r])
             m += 1
     inverse, of_both = inverse_of_rows(room, normal), inverse_of_rows(room, both)
     on_places, on_rates = product(room, inverse, normal), product(room, of_both, both)
@@ -107,7 +110,7 @@ def held(room, eq, turns, closed, stuck, z):
         for k in range(size):
             found.places[i, k] -= eq.rate[i] * on_places[i, k] / eq.rate[k]
             found.rates[i, k] -= on_rates[i, k]
-    for p in range(turns.count):
+    for p in range(turns.numbers):
         for a in range(count):
             opened = dot(turns.gap[p, rows[a]], z)
             for i in range(size):
@@ -131,7 +134,7 @@ def followed(room, eq, turns, state, z):
             continue
         for k in range(size):
             found.places[at, k], found.rates[at, k] = eq.follows[j, k], eq.follows[j, size + k]
-        for p in range(turns.count):
+        for p in range(turns.numbers):
             found.own[at, p] = dot(turns.follows[p, j, :size], z)
             if slips(way):
                 found.own[at, p] -= way * turns.bound[p, j]
@@ -160,25 +163,37 @@ def pressing(room, state):
 
 
 @counting
-def left(room, eq, turns, M, z, rows, speeds):
-    """Return what numbers and the start do to gaps of contacts (m,) at z, or to speeds of rows: (m, k + P)."""
-    found, first = matrix(room, len(rows), M.shape[1]), M.shape[1] - turns.count
-    one = len(M)
+def left(room, eq, turns, M, z, rows, kind):
+    """Return what numbers and the start do to functionals at z (GAPS of contacts, or SPEEDS of rows): (m, k + P)."""
+    found = matrix(room, len(rows), M.shape[1])
     for a in range(len(rows)):
-        functional = eq.speed[rows[a]] if speeds else eq.gap[rows[a]]
-        for i in range(one):
-            if functional[i] != 0.0:
-                for c in range(M.shape[1]):
-                    found[a, c] += functional[i] * M[i, c]
-        for p in range(turns.count):
-            found[a, first + p] += own_of(turns, p, rows[a], z, speeds)
+        _add_left(eq, turns, M, z, rows[a], kind, found[a])
     return found
 
 
+@counting
+def left_of(room, eq, turns, M, z, row, kind):
+    """Return the same of one functional: (k + P,)."""
+    found = vector(room, M.shape[1])
+    _add_left(eq, turns, M, z, row, kind, found)
+    return found
+
+
+@counting
+def _add_left(eq, turns, M, z, row, kind, found):
+    functional, first = eq.speed[row] if kind == SPEEDS else eq.gap[row], M.shape[1] - turns.numbers
+    for i in range(M.shape[0]):
+        if functional[i] != 0.0:
+            for c in range(M.shape[1]):
+                found[c] += functional[i] * M[i, c]
+    for p in range(turns.numbers):
+        found[first + p] += own_of(turns, p, row, z, kind)
+
+
 @inlined
-def own_of(turns, p, row, z, speeds):
+def own_of(turns, p, row, z, kind):
     """Return what number p alone changes in a functional at z."""
-    return dot(turns.speed[p, row], z) if speeds else dot(turns.gap[p, row], z)
+    return dot(turns.speed[p, row], z) if kind == SPEEDS else dot(turns.gap[p, row], z)
 
 
 @counting

@@ -21,8 +21,8 @@ from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.series import Series
+from vanedamp.coupling.engine.trace import Leg
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.response.segment import Segment
 from vanedamp.coupling.system.flow import StateFlow
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.unit_laws import EVENTS, possible_events, signals_of
@@ -121,9 +121,9 @@ class Dynamics:
         joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T @ bound)
         return _parts(joined.tobytes(), len(joined))
 
-    def state(self, segment: Segment) -> np.ndarray:
+    def state(self, leg: Leg) -> np.ndarray:
         """Return u (2N,) at the start of a segment."""
-        return np.asarray(self.unit * np.concatenate([segment.q, segment.v]))
+        return np.asarray(self.unit * np.concatenate([leg.q, leg.v]))
 
     def extended(self, u: np.ndarray, time: float) -> np.ndarray:
         """Return z (K,) of a state u (2N,) at a time in the period, s."""
@@ -156,7 +156,6 @@ class Flow:
         self.X = per[:, None] * solved.generator(free) / per
         self.free, self.known = free / per, solved.known_forces(open_force) / per
         self.carried = solved.carried @ self.free
-        self._functions: dict[tuple[int, int], tuple[np.ndarray, float]] = {}
         self.forces = self.known + solved.spread(self.carried)
 
     @cached_property
@@ -175,24 +174,6 @@ class Flow:
         """The motions of the flow."""
         return Series(self.X)
 
-    def signals(self, r: int) -> dict[str, np.ndarray]:
-        """Return the signals of unit r as functionals (K,) of z (system.unit_laws)."""
-        dynamics = self.dynamics
-        one = np.zeros(len(self.X))
-        one[dynamics.one] = 1.0 / dynamics.size
-        return signals_of(r, dynamics.gap, dynamics.speed, self.forces, one)
-
-    def function(self, r: int, what: int) -> tuple[np.ndarray, float]:
-        """Return the event function `what` (numerics.codes) of unit r, a functional (K,) of z, and its scale.
-
-        It falls through zero at its event. The scale is inf for forces and slips that have none of their own.
-        """
-        if (r, what) not in self._functions:
-            event, system = EVENTS[what], self.dynamics.system
-            function = event.function(event.factors(system, r, self.way[r]), self.signals(r))
-            self._functions[r, what] = function, event.size(system, r)
-        return self._functions[r, what]
-
     @cached_property
     def possible(self) -> list[tuple[int, int]]:
         """The events that can happen, each by its unit and its code."""
@@ -202,10 +183,12 @@ class Flow:
     @cached_property
     def margins(self) -> tuple[np.ndarray, np.ndarray]:
         """The functionals (m, K) of the possible events, each relative to its scale, and their rates."""
-        margins = np.zeros((len(self.possible), len(self.X)))
+        dynamics, system, one = self.dynamics, self.dynamics.system, np.zeros(len(self.X))
+        margins, one[dynamics.one] = np.zeros((len(self.possible), len(self.X))), 1.0 / dynamics.size
         for margin, (r, what) in zip(margins, self.possible, strict=True):
-            functional, scale = self.function(r, what)
-            typical = float(np.abs(functional) @ self.dynamics.typical)
+            event, signals = EVENTS[what], signals_of(r, dynamics.gap, dynamics.speed, self.forces, one)
+            functional, scale = event.function(event.factors(system, r, self.way[r]), signals), event.size(system, r)
+            typical = float(np.abs(functional) @ dynamics.typical)
             margin[:] = functional / (scale if np.isfinite(scale) else typical or 1.0)
         return margins, margins @ self.X
 

@@ -82,7 +82,7 @@ class Equations(NamedTuple):
 class Turns(NamedTuple):
     """What P numbers change in the equations, times their sizes (derivatives.numbers.Parts)."""
 
-    count: int
+    numbers: int
     root: np.ndarray
     rows: np.ndarray
     gap: np.ndarray
@@ -103,7 +103,7 @@ class Turns(NamedTuple):
 
 @record
 class Flows(NamedTuple):
-    """Flows (f) that a motion has met, by the states of the units; empty places are of no state.
+    """Flows (f) that a motion has met, by the states of the units; empty places have no entries.
 
     x: n entries of X at row and column; d: those of its derivatives by a number, at rows `to` and columns `of`;
     margin, slope: m functionals of possible events and their rates (dynamics.Flow), possible: their units and codes.
@@ -111,7 +111,7 @@ class Flows(NamedTuple):
 
     clock: Annotated[np.ndarray, "1", int]
     used: Annotated[np.ndarray, "f", int]  # by the clock
-    count: Annotated[np.ndarray, "f 3", int]  # entries of X, of its derivatives, and possible events
+    counts: Annotated[np.ndarray, "f 3", int]  # entries of X, of its derivatives, and possible events
     state: Annotated[np.ndarray, "f u", int]
     open_force: Annotated[np.ndarray, "f 2u"]
     way: Annotated[np.ndarray, "f u"]

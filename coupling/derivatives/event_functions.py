@@ -51,7 +51,7 @@ def generated(flows, f, z, found):
     """Set found (K,) to X z."""
     for i in range(len(found)):
         found[i] = 0.0
-    for n in range(flows.count[f, 0]):
+    for n in range(flows.counts[f, 0]):
         found[flows.row[f, n]] += flows.x[f, n] * z[flows.column[f, n]]
 
 
@@ -172,7 +172,7 @@ def new_guards(room, eq, turns, count):
     """Return room for the event functions of an event."""
     part = vector(room, count)
     return Guards(
-        matrix(room, count, len(eq.unit)), matrix(room, count, turns.count), vector(room, count), vector(room, count),
+        matrix(room, count, len(eq.unit)), matrix(room, count, turns.numbers), vector(room, count), vector(room, count),
         vector(room, count), part, vector(room, count),
     )  # fmt: skip
 
@@ -193,7 +193,7 @@ def set_guard(room, eq, turns, flows, f, z, moving, bending, guards, g, r, code,
         guards.gradient[g, i] = functional[i]
         if functional[i] != 0.0 and guards.part[g] == eq.parts:
             guards.part[g] = eq.part[i % len(eq.root)]
-    for p in range(turns.count):
+    for p in range(turns.numbers):
         own = turn_of_function(room, eq, turns, flows, f, r, code, p, z)
         for h in range(len(eq.frequency)):
             cosine, sine = harmonic_turns(eq, turns, p, h, time)

@@ -1,4 +1,4 @@
-"""Derivatives of flows and of event functions by numbers of the scene."""
+"""Derivatives of flows by numbers of the scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vanedamp.coupling.derivatives.dynamics import Flow
 from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.series import Series
 from vanedamp.coupling.numerics import codes
-from vanedamp.coupling.system.unit_laws import EVENTS, signals_of, wrenches
+from vanedamp.coupling.system.unit_laws import wrenches
 
 #: flows whose derivatives are kept
 _KEPT = 1000
@@ -21,7 +21,6 @@ class FlowDerivative:
 
     def __init__(self, flow: Flow, numbers: Numbers) -> None:
         self.flow, self.numbers = flow, numbers
-        self._functions: dict[tuple[int, int], np.ndarray] = {}
         dynamics, s, of = flow.dynamics, flow.solved, numbers.parts
         system, rates, one = dynamics.system, dynamics.rates, dynamics.one
         u, way = len(flow.state), flow.way
@@ -64,18 +63,6 @@ class FlowDerivative:
     def series(self) -> Series:
         """The motions of the flow with their derivatives."""
         return self.flow.series.by(self.X)
-
-    def function(self, r: int, what: int) -> np.ndarray:
-        """Return the derivatives (P, K) of the functional of an event (Flow.function)."""
-        if (r, what) not in self._functions:
-            flow, of, event = self.flow, self.numbers.parts, EVENTS[what]
-            own, signals = signals_of(r, of.gap, of.speed, self.forces, np.zeros(len(flow.X))), flow.signals(r)
-            found = event.function(event.factors(flow.dynamics.system, r, flow.way[r]), own)
-            for name, factor in event.terms:
-                if factor in of._fields:
-                    found = found + np.multiply.outer(getattr(of, str(factor))[:, r], signals[name])
-            self._functions[r, what] = found
-        return self._functions[r, what]
 
 
 def derivative_of(flow: Flow, numbers: Numbers) -> FlowDerivative:

@@ -21,8 +21,6 @@ from vanedamp.coupling.numerics.compiler.record import room
 _MOST = 1 << 28
 #: matrices that an event takes at most, and points of a motion
 _MATRICES, _POINTS = 200, 300
-#: state of no unit
-_NONE = -9
 
 
 class FlowTable:
@@ -36,7 +34,7 @@ class FlowTable:
         self.equations, self.turns = equations_of(dynamics), turns_of(dynamics, numbers)
         self.flows = list[Flow]()
         self.segments = SEGMENTS
-        eq, count = self.equations, self.turns.count
+        eq, count = self.equations, self.turns.numbers
         k, K, units = len(eq.scale), len(eq.typical), len(eq.rest)
         long, wide = max(K, 2 * units, k), max(K, 2 * units, k + count)
         moved = np.abs(dynamics.from_state) * eq.scale
@@ -51,16 +49,14 @@ class FlowTable:
         d = self.dynamics
         sizes = {
             "f": places, "n": entries, "d": turned, "m": events, "u": len(d.gap), "K": len(d.turn),
-            "P": self.turns.count,
+            "P": self.turns.numbers,
         }  # fmt: skip
-        stack = room(Flows, sizes)
-        stack.state[:] = _NONE
-        return stack
+        return room(Flows, sizes)
 
     def walking(self, keeps: bool) -> Walking:
         """Return room for a passage, one after the other. keeps: whether what passes is kept."""
         if keeps not in self._walking:
-            eq, P, segments = self.equations, self.turns.count, self.segments
+            eq, P, segments = self.equations, self.turns.numbers, self.segments
             C, K = len(eq.scale) + P, len(eq.typical)
             self._walking[keeps] = room(Walking, {
                 "numbers": WALKING, "k": len(eq.scale), "P": P, "N": len(eq.root), "C": C, "u": len(eq.rest), "K": K,
@@ -83,7 +79,7 @@ class FlowTable:
             self.flows[place] = flow
         stack = self.stack
         stack.used[place] = stack.clock[0]
-        stack.count[place] = len(x), len(d), len(events)
+        stack.counts[place] = len(x), len(d), len(events)
         stack.state[place], stack.open_force[place], stack.way[place] = state, open_force, flow.way
         stack.slips_held[place], stack.stuck[place], stack.most[place] = (
             flow.slips_held,

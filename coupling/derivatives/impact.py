@@ -16,6 +16,7 @@ import numpy as np
 from vanedamp.coupling.derivatives.matrices import (
     add_product,
     copied,
+    copy,
     dot,
     integers,
     matrix,
@@ -24,7 +25,7 @@ from vanedamp.coupling.derivatives.matrices import (
     times,
     vector,
 )
-from vanedamp.coupling.numerics.compiler.jit import counting, inlined, kernel
+from vanedamp.coupling.numerics.compiler.jit import ZERO, counting, inlined, kernel
 
 #: a speed after an impact below this fraction of the fastest of its contacts counts as zero: the end of a chatter
 PLASTIC = 1e-9
@@ -86,7 +87,7 @@ def impact(room, eq, turns, trace, e, law, v, speed):
     fastest of the scene, m/s.
     """
     size = len(v)
-    begun = Jump(v, matrix(room, size, size + turns.count))
+    begun = Jump(v, matrix(room, size, size + turns.numbers))
     for i in range(size):
         begun.derivative[i, i] = 1.0
     met = _approach(room, eq, turns, trace, e, law, begun)
@@ -97,9 +98,9 @@ def impact(room, eq, turns, trace, e, law, v, speed):
         left[r] = trace.impulse[e, r] - compression[r]
     roles = _roles(room, eq, v, compression, speed)
     hit = len(roles.hit)
-    still = matrix(room, hit, size + turns.count)
+    still = matrix(room, hit, size + turns.numbers)
     pressed = _blow(room, eq, turns, begun.v, begun.derivative, roles, vector(room, hit), still)
-    given, steep = vector(room, len(met.speed)), matrix(room, len(met.speed), size + turns.count)
+    given, steep = vector(room, len(met.speed)), matrix(room, len(met.speed), size + turns.numbers)
     for a in range(hit):
         r = roles.hit[a]
         given[r] = met.restitution[r] * pressed.normal[a]
@@ -120,7 +121,7 @@ def _approach(room, eq, turns, trace, e, law, begun):
         found.speed[r] = -dot(eq.J[r], begun.v)
         for i in range(size):
             found.slope[r, i] = -eq.J[r, i]
-        for p in range(turns.count):
+        for p in range(turns.numbers):
             found.slope[r, size + p] = -dot(turns.J[p, r], begun.v)
     for h in range(trace.first[e], trace.first[e + 1]):
         found.speed[trace.struck[h]] = -trace.before[h]
@@ -134,7 +135,7 @@ def _approach(room, eq, turns, trace, e, law, begun):
             found.restitution[r], by_speed, by_coefficient = law[0, r], law[1, r], law[2, r]
         for c in range(columns):
             found.steep[r, c] = by_speed * found.slope[r, c]
-        for p in range(turns.count):
+        for p in range(turns.numbers):
             found.steep[r, size + p] += by_coefficient * turns.restitution[p, r]
     return found
 
@@ -215,7 +216,8 @@ def _blow(room, eq, turns, v, derivative, roles, target, steep):
     rows, kept, scale = matrix(room, count, size), integers(room, count), vector(room, count)
     for a in range(count):
         kept[a] = roles.hit[a] if a < hit else units + roles.sticks[a - hit]
-        rows[a], mobility = eq.J[kept[a]], eq.mobility[kept[a]]
+        copy(rows[a], eq.J[kept[a]])
+        mobility = eq.mobility[kept[a]]
         scale[a] = 1.0 / math.sqrt(mobility) if mobility > 0.0 else 1.0
     moved = product(room, rows, lever)
     for a in range(count):
@@ -235,14 +237,14 @@ def _blow(room, eq, turns, v, derivative, roles, target, steep):
     impulse, after = times(room, solve, asked), vector(room, size)
     for i in range(size):
         after[i] = v[i] + dot(lever[i], impulse)
-    of_lever = matrix(room, turns.count, size)
-    for p in range(turns.count):
+    of_lever = matrix(room, turns.numbers, size)
+    for p in range(turns.numbers):
         _turn_of_levers(eq, turns, p, roles.hit, roles.drag, roles.sticks, lever, impulse, of_lever[p])
         for a in range(count):
             slope[a, size + p] -= dot(turns.J[p, kept[a]], after) + dot(rows[a], of_lever[p])
     of_impulse, found = product(room, solve, slope), copied(room, derivative)
     add_product(found, lever, of_impulse)
-    for p in range(turns.count):
+    for p in range(turns.numbers):
         for i in range(size):
             found[i, size + p] += of_lever[p, i]
     return _Blow(after, found, impulse[:hit], of_impulse[:hit])
@@ -255,7 +257,7 @@ def _expand(room, eq, turns, pressed, roles, given, steep, impulse, speed):
     impulse: (2u,) of the expansion, as the engine has it; speed: the fastest of the scene, m/s.
     """
     units, size, columns = len(eq.rest), len(pressed.v), steep.shape[1]
-    every, none, slides, more = integers(room, units), integers(room, 0), vector(room, units), 0
+    every, none, slides, more = integers(room, units), integers(room, ZERO), vector(room, units), 0
     for r in range(units):
         every[r], slides[r] = r, roles.drag[r]
     for s in range(len(roles.sticks)):
@@ -265,7 +267,7 @@ def _expand(room, eq, turns, pressed, roles, given, steep, impulse, speed):
     add_product(begun.derivative, lever, steep)
     for i in range(size):
         begun.v[i] = pressed.v[i] + dot(lever[i], given)
-    for p in range(turns.count):
+    for p in range(turns.numbers):
         _turn_of_levers(eq, turns, p, every, slides, none, lever, given, moved)
         for i in range(size):
             begun.derivative[i, size + p] += moved[i]
@@ -305,7 +307,7 @@ def _newton(room, eq, turns, trace, e, begun, met, speed):
     if not trace.reduced[e] or not bounces:
         blow = _blow(room, eq, turns, begun.v, begun.derivative, roles, target, moved)
         return Jump(blow.v, blow.derivative)
-    left, n, P = 0.0, size, turns.count
+    left, n, P = 0.0, size, turns.numbers
     for i in range(n):
         gained = 0.0
         for r in range(len(eq.J)):
@@ -339,11 +341,11 @@ def _newton(room, eq, turns, trace, e, begun, met, speed):
 def scaled(room, eq, turns, jump, w):
     """Return the derivatives of w (N,) after a jump of speeds by w before (N, N), and by numbers (N, P): w = root v."""
     n = len(w)
-    after, own = matrix(room, n, n), matrix(room, n, turns.count)
+    after, own = matrix(room, n, n), matrix(room, n, turns.numbers)
     for i in range(n):
         for k in range(n):
             after[i, k] = eq.root[i] * jump.derivative[i, k] / eq.root[k]
-    for p in range(turns.count):
+    for p in range(turns.numbers):
         for i in range(n):
             own[i, p] = eq.root[i] * jump.derivative[i, n + p] + turns.root[p, i] * jump.v[i]
             for k in range(n):

@@ -112,6 +112,13 @@ def add_product(found, a, b):
 
 
 @kernel
+def copy(found, a):
+    """Set numbers to others: an assignment by numba brings its message on shapes, half a second to compile."""
+    for i in range(len(found)):
+        found[i] = a[i]
+
+
+@kernel
 def times(room, a, x):
     """Return a x of a matrix and a vector of its columns; those of a longer vector count as far as there are any."""
     found = vector(room, a.shape[0])

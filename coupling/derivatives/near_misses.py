@@ -6,7 +6,7 @@ import math
 
 from vanedamp.coupling.derivatives.matrices import dot, matrix, unit, vector
 from vanedamp.coupling.derivatives.series import follow
-from vanedamp.coupling.numerics.compiler.jit import counting
+from vanedamp.coupling.numerics.compiler.jit import ZERO, counting
 
 #: points of a period, and of one turn of the fastest motion, between which least margins are sought
 _LOOKS, _TURN = 32, 12
@@ -21,7 +21,7 @@ def least_margin(room, eq, flows, walk, f, z, duration, who, what):
     That is event `what` of unit `who`. Beside it which it is, -1: none. Relative to its scale, where the margin turns
     inside the segment by more than round-off: minima between points are found by their slopes.
     """
-    count, size = flows.count[f, 2], len(z)
+    count, size = flows.counts[f, 2], len(z)
     if duration <= 0.0 or count == 0:
         return math.inf, -1
     step = min(eq.period / _LOOKS, 2.0 * math.pi / _TURN / (flows.fastest[f] if flows.fastest[f] > 0.0 else 1.0))
@@ -74,13 +74,13 @@ def _motion(room, flows, walk, f, z, step, steps):
 def _minimum(room, flows, walk, f, row, z, share, step):
     """Return the minimum of margin `row` about a share of a step after z, by Newton's method."""
     at, low, high, now, bends = share * step, 0.0, step, vector(room, len(z)), vector(room, len(z))
-    slopes, nothing = flows.slope[f, row], matrix(room, len(z), 0)
-    for n in range(flows.count[f, 0]):
+    slopes, nothing = flows.slope[f, row], matrix(room, len(z), ZERO)
+    for n in range(flows.counts[f, 0]):
         bends[flows.column[f, n]] += slopes[flows.row[f, n]] * flows.x[f, n]
     for _ in range(_STEPS):
         for i in range(len(z)):
             now[i] = z[i]
-        follow(flows, f, 0, now, nothing, at, walk.terms, walk.of_terms)
+        follow(flows, f, ZERO, now, nothing, at, walk.terms, walk.of_terms)
         tilt, bend = dot(slopes, now), dot(bends, now)
         if tilt < 0.0:
             low = at

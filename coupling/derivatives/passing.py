@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.derivatives.event_functions import TANGENTIAL, harmonic_turns
-from vanedamp.coupling.derivatives.matrices import dot, empty, times, vector
+from vanedamp.coupling.derivatives.matrices import copy, dot, empty, times, vector
 from vanedamp.coupling.derivatives.near_misses import least_margin
 from vanedamp.coupling.derivatives.saltation import (
     LAST_FLIGHT,
@@ -68,8 +68,8 @@ def _pass_segment(room, eq, turns, flows, walk, trace, i):
     empty(room)
     f = find(flows, trace.state[i], trace.open_force[i])
     if f < 0:
-        walk.wanted[:] = trace.state[i]
-        walk.wanted_force[:] = trace.open_force[i]
+        copy(walk.wanted, trace.state[i])
+        copy(walk.wanted_force, trace.open_force[i])
         return WANTS_FLOW
     z, outcome = state_at(room, eq, trace, i), KNOWN
     walk.met[i] = math.nan
@@ -103,10 +103,14 @@ def _pass_segment(room, eq, turns, flows, walk, trace, i):
         if least <= TANGENTIAL and trace.duration[i] > LAST_FLIGHT * eq.period:
             worsen(walk, GRAZING)
     _begin(eq, turns, walk, trace, i, walk.end)
-    walk.z[:] = z
+    copy(walk.z, z)
     follow(flows, f, k, walk.z, walk.end, trace.duration[i], walk.terms, walk.of_terms)
     if at[KEEPS]:
-        walk.begins[i], walk.ends[i], walk.z_ends[i], walk.shifts[i] = walk.M, walk.end[:one], walk.z, walk.shift
+        copy(walk.z_ends[i], walk.z)
+        copy(walk.shifts[i], walk.shift)
+        for n in range(one):
+            copy(walk.begins[i, n], walk.M[n])
+            copy(walk.ends[i, n], walk.end[n])
     return KNOWN
 
 
@@ -117,7 +121,7 @@ def _begin(eq, turns, walk, trace, i, Z):
     for n in range(Z.shape[0]):
         for c in range(Z.shape[1]):
             Z[n, c] = walk.M[n, c] if n < one else 0.0
-    for p in range(turns.count):
+    for p in range(turns.numbers):
         for h in range(len(eq.frequency)):
             at = one + 1 + h
             Z[at, k + p], Z[at + len(eq.frequency), k + p] = harmonic_turns(eq, turns, p, h, time)
@@ -130,7 +134,7 @@ def _part(room, eq, turns, flows, walk, trace, i, f, z):
     if (walk.at[REACHED] and walk.at[SHORT]) or not start <= walk.part[0] <= start + trace.duration[i]:
         return
     _begin(eq, turns, walk, trace, i, walk.reached)
-    walk.z_reached[:] = z
+    copy(walk.z_reached, z)
     follow(
         flows, f, len(eq.scale), walk.z_reached, walk.reached, walk.part[0] - start, walk.terms, walk.of_terms
     )  # fmt: skip

@@ -19,6 +19,7 @@ from vanedamp.coupling.derivatives.constraints import (
     held,
     largest,
     left,
+    left_of,
     own_of,
     presses,
     pressing,
@@ -46,11 +47,13 @@ from vanedamp.coupling.derivatives.walking import (
     COMPLETED,
     COUNTS,
     FLOW,
+    GAPS,
     GRAZING,
     KNOWN,
     LAW_OF,
     LOST,
     SMOOTH,
+    SPEEDS,
     STATUS,
     UNTRUSTED,
     WANTS_FLOW,
@@ -194,7 +197,7 @@ def _jump(room, eq, turns, walk, trace, i, before, z):
     before, z: (K,) before and after.
     """
     size, units, e = len(eq.root), len(eq.rest), i
-    found = Map(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.count))
+    found = Map(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.numbers))
     w, w_new = before[size : 2 * size], z[size : 2 * size]
     kick, hits, struck = vector(room, size), False, vector(room, size)
     for r in range(2 * units):
@@ -219,14 +222,14 @@ def _jump(room, eq, turns, walk, trace, i, before, z):
             # after a plastic impact a small restitution adds bounces that end at once, whose sum is nothing to first
             # order; not so where the contact opens
             if eq.restitution[r] == 0.0 and not presses(trace.state[i, r]) and trace.state[i, r] != TOUCHING:
-                for p in range(turns.count):
+                for p in range(turns.numbers):
                     if turns.restitution[p, r] != 0.0:
                         return found, kick, False
         rates, own = scaled(room, eq, turns, jump, w)
         found = Map(found.places, rates, found.own)
         for k in range(size):
             struck[k] = eq.root[k] * jump.v[k]
-            for p in range(turns.count):
+            for p in range(turns.numbers):
                 found.own[size + k, p] = own[k, p]
     after = vector(room, len(z))
     for k in range(len(z)):
@@ -296,7 +299,8 @@ def _on_rates(room, one, other):
 def after_event(room, eq, turns, flows, walk, trace, i, f, z):
     """Return the derivative (2N, C) after event i as the motion goes on from z (K,) in flow f, and what came of it."""
     e, before, M, one = i, walk.z, walk.end[: len(eq.unit)], len(eq.unit)
-    walk.shift[:] = 0.0
+    for c in range(len(walk.shift)):
+        walk.shift[c] = 0.0
     if trace.unit[e] < 0:
         return M, KNOWN if agrees(room, eq, walk, before, z) else UNTRUSTED
     if eq.law and walk.at[LAW_OF] != e and trace.first[e] < trace.first[e + 1]:
@@ -486,12 +490,10 @@ def _closings(room, eq, turns, flows, walk, trace, i, M):
                 return M, WANTS_FLOW
             generated(flows, f, z, rate)
             generated(flows, other, z, later)
-            speed, rows = dot(eq.gap[contact], rate), integers(room, 1)
-            rows[0] = contact
-            closes = left(room, eq, turns, moved, z, rows, False)
+            speed, closes = dot(eq.gap[contact], rate), left_of(room, eq, turns, moved, z, contact, GAPS)
             for k in range(one):
                 for c in range(columns):
-                    moved[k, c] += (later[k] - rate[k]) / speed * closes[0, c]
+                    moved[k, c] += (later[k] - rate[k]) / speed * closes[c]
             f = other
     difference = matrix(room, one, columns)
     for k in range(one):
@@ -506,7 +508,7 @@ def _closings(room, eq, turns, flows, walk, trace, i, M):
 def find(flows, state, open_force):
     """Return the place of the flow with units in states (u,), -1 if there is none yet."""
     for f in range(len(flows.norm)):
-        same = True
+        same = flows.counts[f, 0] > 0  # of an empty place it is none
         for r in range(len(state)):
             same = same and flows.state[f, r] == state[r]
         for r in range(len(open_force) if same else 0):
@@ -537,7 +539,7 @@ def _still(room, eq, turns, flows, walk, trace, i, f, z, M):
     Round-off is relative to the largest derivatives so far: after a chatter has amplified these, it may be as large
     as the derivative is now.
     """
-    units, one, k, P = len(eq.rest), len(eq.unit), len(eq.scale), turns.count
+    units, one, k, P = len(eq.rest), len(eq.unit), len(eq.scale), turns.numbers
     closed, count = integers(room, units), 0
     for r in range(eq.contacts):
         closed[r] = 1 if eq.spring[r] == math.inf and presses(trace.state[i, r]) else 0
@@ -560,13 +562,13 @@ def _still(room, eq, turns, flows, walk, trace, i, f, z, M):
             walk.reach[j, c] = max(max(walk.reach[j, c], now[j, c]), least)
     loose = False
     for kind in range(2):
-        rows, of_speeds = speeds[:stuck] if kind == 0 else gaps, kind == 0
-        moved, most = left(room, eq, turns, M, z, rows, of_speeds), matrix(room, len(rows), 1 + P)
+        rows = speeds[:stuck] if kind == SPEEDS else gaps
+        moved, most = left(room, eq, turns, M, z, rows, kind), matrix(room, len(rows), 1 + P)
         set_largest(moved, k, most)
         for a in range(len(rows)):
-            functional = eq.speed[rows[a]] if of_speeds else eq.gap[rows[a]]
+            functional = eq.speed[rows[a]] if kind == SPEEDS else eq.gap[rows[a]]
             for c in range(1 + P):
-                terms = abs(own_of(turns, c - 1, rows[a], z, of_speeds)) if c > 0 else 0.0
+                terms = abs(own_of(turns, c - 1, rows[a], z, kind)) if c > 0 else 0.0
                 of_now = terms
                 for j in range(one):
                     terms += abs(functional[j]) * walk.reach[j, c]
@@ -592,10 +594,10 @@ def check_idle(room, eq, turns, walk, trace, i, M, z):
         return
     # gaps and their rates, of which a contact with a force holds some
     carried = applied(room, begun(room, eq, turns, trace.state[i], pressing(room, trace.state[i]), z), M)
-    for speeds in (False, True):
-        opened = left(room, eq, turns, carried, z, idle[:count], speeds)
+    for kind in range(2):
+        opened = left(room, eq, turns, carried, z, idle[:count], kind)
         for a in range(count):
-            size = eq.play[idle[a]] * (eq.omega if speeds else 1.0)
+            size = eq.play[idle[a]] * (eq.omega if kind == SPEEDS else 1.0)
             for c in range(walk.at[COUNTS], M.shape[1]):
                 if abs(opened[a, c]) > _NOTHING * size:
                     worsen(walk, GRAZING)

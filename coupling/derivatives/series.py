@@ -160,7 +160,7 @@ def panels_of(norm, duration):
 @counting
 def follow(flows, f, first, z, Z, duration, a, b):
     """Advance z (K,) and Z (K, p) of flow f over a duration, s. first: column of the first number, or beyond."""
-    n, d = flows.count[f, 0], flows.count[f, 1] if first < Z.shape[1] else 0
+    n, d = flows.counts[f, 0], flows.counts[f, 1] if first < Z.shape[1] else 0
     panels = panels_of(flows.norm[f], duration)
     for _ in range(panels):
         set_terms(

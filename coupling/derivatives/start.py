@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.derivatives.constraints import applied, begun, left, own_of, presses
+from vanedamp.coupling.derivatives.constraints import applied, begun, left_of, own_of, presses
 from vanedamp.coupling.derivatives.event_functions import generated
 from vanedamp.coupling.derivatives.impact import impact, scaled
 from vanedamp.coupling.derivatives.matrices import (
@@ -18,9 +18,9 @@ from vanedamp.coupling.derivatives.matrices import (
     vector,
 )
 from vanedamp.coupling.derivatives.saltation import SHUT, SLOW, check_idle, closed_at, worsen
-from vanedamp.coupling.derivatives.walking import GIVEN, GRAZING
+from vanedamp.coupling.derivatives.walking import GAPS, GIVEN, GRAZING, SPEEDS
 from vanedamp.coupling.numerics.codes import HELD, OPEN, STICK
-from vanedamp.coupling.numerics.compiler.jit import counting
+from vanedamp.coupling.numerics.compiler.jit import ZERO, counting
 
 #: a force this close to its bound is at it: relative to its terms, and to what all loads together could make of it
 _NEAR, _ROUND_OFF = 1e-9, 1e-13
@@ -50,7 +50,7 @@ def first_derivative(room, eq, turns, flows, walk, trace, f, z):
         v = vector(room, size)
         for i in range(size):
             v[i] = given[size + i] / eq.root[i]
-        jump = impact(room, eq, turns, trace, 0, walk.law, v, trace.speed[0])
+        jump = impact(room, eq, turns, trace, ZERO, walk.law, v, trace.speed[0])
         rates, own = scaled(room, eq, turns, jump, given[size:])
         moved = product(room, rates, M[size:])
         for i in range(size):
@@ -63,13 +63,13 @@ def first_derivative(room, eq, turns, flows, walk, trace, f, z):
     for i in range(one):
         for c in range(M.shape[1]):
             walk.unheld[i, c] = M[i, c] * (eq.scale[c] if c < k else 1.0)
-    M = applied(room, begun(room, eq, turns, trace.state[0], closed_at(room, eq, trace, 0), z), M)
+    M = applied(room, begun(room, eq, turns, trace.state[0], closed_at(room, eq, trace, ZERO), z), M)
     idle = matrix(room, one, M.shape[1])
     for i in range(one):
         for c in range(M.shape[1]):
             idle[i, c] = eq.from_state[i, c] * eq.scale[c] if c < k else M[i, c]
             M[i, c] *= eq.scale[c] if c < k else 1.0
-    check_idle(room, eq, turns, walk, trace, 0, idle, z)
+    check_idle(room, eq, turns, walk, trace, ZERO, idle, z)
     return M
 
 
@@ -79,7 +79,7 @@ def _placed(room, eq, turns, walk, trace, z):
 
     Springs of friction dampers are unloaded to their bounds.
     """
-    k, P, one, sliders, bodies = len(eq.scale), turns.count, len(eq.unit), len(eq.bound), len(eq.along)
+    k, P, one, sliders, bodies = len(eq.scale), turns.numbers, len(eq.unit), len(eq.bound), len(eq.along)
     kept, own, first = matrix(room, k, k + P), matrix(room, one, P), k - sliders
     for s in range(k):
         kept[s, s] = 1.0
@@ -137,8 +137,8 @@ def _push(room, eq, turns, trace, z, kept, own, pushed):
     for a in range(shut):
         for m in range(len(pushed)):
             of_pushed[a, m] = gap[a, pushed[m]]
-        for p in range(turns.count):
-            opened[a, k + p] += own_of(turns, p, rows[a], z, False)
+        for p in range(turns.numbers):
+            opened[a, k + p] += own_of(turns, p, rows[a], z, GAPS)
             for i in range(one):
                 opened[a, k + p] += eq.gap[rows[a], i] * own[i, p]
     moved = product(room, inverse_of_rows(room, of_pushed), opened)
@@ -153,7 +153,7 @@ def _begins_at_event(room, eq, turns, flows, walk, trace, f, z, M):
 
     M: (2N, C) of the start, which may keep what is to count.
     """
-    units, moving, closed = len(eq.rest), vector(room, len(z)), closed_at(room, eq, trace, 0)
+    units, moving, closed = len(eq.rest), vector(room, len(z)), closed_at(room, eq, trace, ZERO)
     generated(flows, f, z, moving)
     for r in range(units):
         parts = r < eq.contacts and trace.state[0, r] == OPEN and closed[r] == 0
@@ -164,24 +164,23 @@ def _begins_at_event(room, eq, turns, flows, walk, trace, f, z, M):
             way != 0.0 and not flows.slips_held[f, r] and eq.rubs[r] and way * dot(eq.speed[units + r], moving) > 0.0
         )
         slips = slips and abs(dot(eq.J[units + r], trace.v[0])) <= SLOW * trace.speed[0]
-        if parts and _turned(room, eq, turns, walk, r, z, M, False):
+        if parts and _turned(room, eq, turns, walk, r, z, M, GAPS):
             return True
-        if slips and _turned(room, eq, turns, walk, units + r, z, M, True):
+        if slips and _turned(room, eq, turns, walk, units + r, z, M, SPEEDS):
             return True
     return False
 
 
 @counting
-def _turned(room, eq, turns, walk, row, z, M, speeds):
+def _turned(room, eq, turns, walk, row, z, M, kind):
     """Return whether motions that count change a functional at the start: any, or by numbers if the start is given."""
     if not walk.at[GIVEN]:
         return True
-    rows, k, functional = integers(room, 1), len(eq.scale), eq.speed[row] if speeds else eq.gap[row]
-    rows[0] = row
-    moved, terms = left(room, eq, turns, M, z, rows, speeds), dot_abs(functional, eq.typical)
+    functional = eq.speed[row] if kind == SPEEDS else eq.gap[row]
+    moved, terms = left_of(room, eq, turns, M, z, row, kind), dot_abs(functional, eq.typical)
     most = 0.0
-    for c in range(k, M.shape[1]):
-        most = max(most, abs(moved[0, c]))
+    for c in range(len(eq.scale), M.shape[1]):
+        most = max(most, abs(moved[c]))
     return most > _NEAR * terms
 
 
@@ -216,7 +215,7 @@ def _loose(room, eq, turns, flows, walk, trace, f, z, M):
             least = min(least, limit - force[r] - drag * lever)
         least = least if touches else -force[r]
         edge = noise[r] + _NEAR * grip
-        if least >= -edge and (least <= edge or _turned(room, eq, turns, walk, r, z, M, False)):
+        if least >= -edge and (least <= edge or _turned(room, eq, turns, walk, r, z, M, GAPS)):
             return True
     for r in range(eq.contacts, eq.jenkins):
         if not flows.stuck[f, r] or abs(force[units + r]) < (1.0 - _NEAR) * eq.limit[r]:

@@ -35,12 +35,11 @@ from vanedamp.coupling.derivatives.walking import (
     WANTS_ROOM,
 )
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
-from vanedamp.coupling.engine.run import EventDrivenRun
 from vanedamp.coupling.engine.trace import COUNT, Leg, Trace, leg_of
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import fitted
-from vanedamp.coupling.response.segment import Event
+from vanedamp.coupling.response.segment import Event, EventRun
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.tangents.differences import NotSmooth, derivative
@@ -50,7 +49,7 @@ EVENTS_PER_PERIOD = 2000
 _STATUSES = list(PassageStatus)
 
 
-def run_from(frame: Frame, state: np.ndarray, periods: int, earlier: EventDrivenRun | None = None) -> EventDrivenRun:
+def run_from(frame: Frame, state: np.ndarray, periods: int, earlier: EventRun | None = None) -> EventRun:
     """Return the engine's run over periods that begins with a state (k,).
 
     earlier: a run that is read no more: it begins again if it is of the same system, or gives its subsystems.
@@ -125,7 +124,7 @@ class PassageWalk:
         #: whether a chatter was completed, which the engine ends at the last flights of a millionth of a period
         self.completed = False
 
-    def passage(self, run: EventDrivenRun, periods: int) -> Passage:
+    def passage(self, run: EventRun, periods: int) -> Passage:
         """Walk a run to the end of the periods."""
         k, P = len(self._dynamics.scale), 0 if self._numbers is None else len(self._numbers)
         state, derivative, by_number = np.full(k, np.nan), np.full((k, k), np.nan), np.full((k, P), np.nan)
@@ -140,9 +139,9 @@ class PassageWalk:
             status = PassageStatus.STOPPED
         else:
             state = self._frame.state_of(final)
-            if self._watch is not None:
+            if self._watch is not None and before is not None:
                 self._watch.end(before)
-            if made is not None and end_walk(*made.records(run.trace), state, float(periods)):
+            if made is not None and before is not None and end_walk(*made.records(run.trace), state, float(periods)):
                 derivative, by_number = made.derivatives(before, periods)
         clearance = (np.inf, "")
         if made is not None:
@@ -152,7 +151,7 @@ class PassageWalk:
         peaks = run.records.peak[:periods].copy()
         return Passage(state, derivative, tuple(self._crossings), clearance, status, peaks, by_number)
 
-    def _walked(self, run: EventDrivenRun, periods: int, made: _Made | None) -> Before | None:
+    def _walked(self, run: EventRun, periods: int, made: _Made | None) -> Before | None:
         """Walk to the end. Returns the end of the last segment, None without any."""
         done, before, began = 0, None, None
         for trace in run.course(periods):
@@ -212,13 +211,14 @@ class PassageWalk:
 
     def _part_of(self, trace: Trace, i: int, flow: Flow) -> None:
         """Keep the state at the part of a period that is wanted, if it lies in segment i."""
-        leg, nothing = leg_of(trace, i, self._frame.system.period), np.zeros((0, 0))
+        leg, k = leg_of(trace, i, self._frame.system.period), len(self._dynamics.scale)
         after = self._part * self._frame.system.period - leg.start
         if not 0.0 <= after <= leg.duration:
             return
         z = self._dynamics.extended(self._dynamics.state(leg), leg.time)
         there = flow.series.course(z, np.zeros((len(z), 0)), after, False).last
-        self.reached = self._dynamics.to_state @ there[: self._dynamics.one], nothing, nothing
+        state = self._dynamics.to_state @ there[: self._dynamics.one]
+        self.reached = state, np.full((k, k), np.nan), np.full((k, 0), np.nan)
 
 
 class _Made:

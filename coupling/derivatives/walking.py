@@ -8,6 +8,8 @@ import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
 
+#: functionals of units: gaps of contacts, or speeds of rows
+GAPS, SPEEDS = np.int64(0), np.int64(1)
 #: defects of a derivative, each worse than the one before (passage.PassageStatus)
 OK, GRAZING, COINCIDENT, UNDETERMINED, STOPPED = range(5)
 #: what comes of an event: its derivative is known, or there is none; or Python is to find a flow, slopes of a law, room

@@ -112,9 +112,9 @@ def leg_of(trace: Trace, i: int, length: float) -> Leg:
         trace.struck[struck].copy(), trace.before[struck].copy(), trace.after[struck].copy(), float(trace.loss[e]),
         bool(trace.reduced[e]),
     )  # fmt: skip
-    numbers = (float(getattr(trace, name)[i]) for name in ("time", "duration", "speed"))
-    arrays = (getattr(trace, name)[i].copy() for name in ("state", "q", "v", "open_force"))
-    return Leg(length, int(trace.period[i]), *numbers, *arrays, event)
+    state, q, v, open_force = (part[i].copy() for part in (trace.state, trace.q, trace.v, trace.open_force))
+    time, duration, speed = float(trace.time[i]), float(trace.duration[i]), float(trace.speed[i])
+    return Leg(length, int(trace.period[i]), time, duration, speed, state, q, v, open_force, event)
 
 
 def turned(trace: Trace) -> None:

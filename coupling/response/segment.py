@@ -21,6 +21,7 @@ from vanedamp.coupling.numerics.codes import EVENTS, PERIOD
 from vanedamp.coupling.response.evaluation import Run
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
+from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.system.system import System
 
 #: below this size, exp(z) - 1 - z and its quotient by z are computed by their series
@@ -144,8 +145,18 @@ START = Begun()
 class EventRun(Run, Protocol):
     """A run of an engine, which knows its motion between events. It must keep its events, and ends at `max_events`."""
 
+    whole: System
     records: Records
     max_events: int
+    #: the course of a run that has one, and how it has ended (engine.trace)
+    trace: Any
+    status: Status
+
+    def course(self, periods: int) -> Iterator[Any]:
+        """Run to the end of `periods` from the start. Yield the course whenever it is full, and at the end."""
+
+    def begin_from(self, start: RestartState) -> None:
+        """Let the run begin, or begin again, from a start."""
 
     @property
     def counters(self) -> np.ndarray:

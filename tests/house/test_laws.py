@@ -5,10 +5,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 #: engines, whose kernels are compiled, and methods with steps in time, which are witnesses of them
 OWN_LAWS = ("engine", "methods")
-#: accelerations and their derivatives by numbers; impulses; the table that they read
-SOLVED_FOR = {
-    "system/flow.py", "derivatives/flow_derivative.py", "derivatives/jump.py", "system/unit_laws.py",
-}  # fmt: skip
+#: accelerations and their derivatives by numbers; the table that they read
+SOLVED_FOR = {"system/flow.py", "derivatives/flow_derivative.py", "system/unit_laws.py"}
 
 
 def _naming(*words: str) -> set[str]:

@@ -65,8 +65,10 @@ def note_segment(system, flows, st, watched, scratch, trace, i):
 @kernel
 def note_event(system, st, watched, rec, scratch, trace, e, ends):
     """Write down event e, which ends a segment, or stands before the first."""
-    hits, units = True, len(trace.rows)
+    hits, units = False, len(trace.rows)
     contacts = len(st.state) - system.friction_rows
+    for entry in range(st.counters[LOGGED]):
+        hits = hits or (rec.log[entry, 1] == IMPACT and system.spring[int(rec.log[entry, 2])] == math.inf)
     if ends:
         k, nearest = -1, math.inf
         for j in range(len(watched.status)):

@@ -10,10 +10,9 @@ from tests.reference.planar_sequence import PlanarSequence, walk
 from tests.tools import periodic_scenes
 from tests.tools.planar import initial_motion, planar_scene
 from tests.tools.planar_laws import scene_of, tables
-from vanedamp.coupling.derivatives.constraints import Constraints
+from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.passage import PassageStatus
-from vanedamp.coupling.derivatives.start import Start
-from vanedamp.coupling.engine.backends import engine_run
+from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
 from vanedamp.coupling.engine.plane.planar_run import PlanarRun
 from vanedamp.coupling.orbits.branch import Branch, Branches
 from vanedamp.coupling.orbits.continuation import kept
@@ -22,7 +21,6 @@ from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.response.segment import Walk
 from vanedamp.coupling.scene.orbit import Orbit
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -120,14 +118,31 @@ def test_matches_a_fixed_sequence_in_40_digits(case):
 # --- differences of the engine
 
 
+class First:
+    """Takes the derivative M as a motion begins, without what closed contacts and friction hold."""
+
+    nears, M = False, None
+
+    def begin(self, unheld):
+        pass
+
+    def segment(self, begun, duration):
+        self.M = begun.M if self.M is None else self.M
+
+    def event(self, before, new, M, shift):
+        pass
+
+    def end(self, before):
+        pass
+
+
 def directions(found, x):
     """Directions (k, m), in units of the scale, in which a state may move without breaking closed contacts."""
-    frame, dynamics = found._frame, found.dynamics
-    start = found.restart_of(x)
-    segment = next(iter(Walk(engine_run(frame.system, start, new_records(frame.system, 1, 0), True, 100), 1)))
-    u = np.zeros(len(dynamics.turn))
-    begun = Constraints(dynamics, None).begun(segment.state, Start(dynamics, x).closed(segment), u).matrix
-    held = dynamics.to_state @ begun @ dynamics.from_state
+    first = First()
+    PassageWalk(found.dynamics, EventNames(found.scene, found._frame.system), x, watch=first).passage(
+        run_from(found._frame, x, 1), 1
+    )
+    held = found.dynamics.to_state @ first.M / found.scale
     left, sizes, _ = np.linalg.svd(held / found.scale[:, None] * found.scale)
     return left[:, sizes > 1e-9]
 
