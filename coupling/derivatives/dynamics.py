@@ -136,7 +136,7 @@ class Dynamics:
         if key not in self._flows:
             if len(self._flows) >= _KEPT:
                 self._flows.clear()
-            self._flows[key] = Flow(self, state, open_force)
+            self._flows[key] = Flow(self, state.copy(), open_force.copy())
         return self._flows[key]
 
 
@@ -168,6 +168,11 @@ class Flow:
     def named(self) -> np.ndarray:
         """The states (u,) without slips that constraints hold."""
         return np.where(self.slips_held & (self.way != 0.0) & self.rubs, codes.STICK, self.state)
+
+    @cached_property
+    def key(self) -> bytes:
+        """What tells these from others."""
+        return self.named.tobytes()
 
     @cached_property
     def series(self) -> Series:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vanedamp.coupling.derivatives.dynamics import Flow
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import CASING, FLOOR, SURFACES, System
@@ -25,7 +26,7 @@ class EventNames:
         first = np.lexsort((np.where(self._contact, 0, system.body), system.surface == CASING, self._contact))
         self._order = first if self._slides.all() else np.arange(len(system.rest))
         self.names = []
-        self._events: dict[tuple[bytes, bytes, bytes], str] = {}
+        self._events: dict[tuple[bytes, bytes, tuple[int, ...]], str] = {}
         for r in range(len(system.rest)):
             body, surface, corner = int(system.body[r]), int(system.surface[r]), int(system.corner[r])
             if system.without_body[r]:
@@ -45,15 +46,16 @@ class EventNames:
         turns = event.order == codes.VELOCITY and not self._contact[r]
         return f"{'turns' if turns else event.name} {self.names[r]}"
 
-    def event(self, old: np.ndarray, new: np.ndarray, hit: np.ndarray) -> str:
-        """Return the name of an event from the states (u,) of the units before and after it and those hit (m,)."""
-        key = old.tobytes(), new.tobytes(), hit.tobytes()
+    def event(self, before: Flow, after: Flow, hit: list[int]) -> str:
+        """Return the name of an event between two flows that hits some units."""
+        key = before.key, after.key, tuple(hit)
         if key not in self._events:
-            self._events[key] = self._event(old, new, hit)
+            self._events[key] = self._event(before.named, after.named, hit)
         return self._events[key]
 
-    def _event(self, old: np.ndarray, new: np.ndarray, hit: np.ndarray) -> str:
-        hits = {r for r in hit.tolist() if not (self._slides[r] and _alike(old[r]) == codes.CLOSED)}
+    def _event(self, old: np.ndarray, new: np.ndarray, hit: list[int]) -> str:
+        """Return the same from the states (u,) of the units before and after."""
+        hits = {r for r in hit if not (self._slides[r] and _alike(old[r]) == codes.CLOSED)}
         parts = [f"impact {self.names[r]}" for r in sorted(hits)]
         for r in self._order[(old != new)[self._order]].tolist():
             change = self._change(_alike(old[r]), _alike(new[r]), bool(self._rubs[r]), bool(self._contact[r]))

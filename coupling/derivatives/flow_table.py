@@ -66,7 +66,7 @@ class FlowTable:
 
     def add(self, state: np.ndarray, open_force: np.ndarray) -> None:
         """Find the flow with units in states (u,), in place of the one that was used least lately if there are many."""
-        flow = self.dynamics.flow(state.copy(), open_force.copy())
+        flow = self.dynamics.flow(state, open_force)
         x, events = np.argwhere(flow.X), flow.possible
         D = np.zeros((0, *flow.X.shape)) if self.numbers is None else derivative_of(flow, self.numbers).X
         d = np.argwhere(D)

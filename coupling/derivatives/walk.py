@@ -158,18 +158,16 @@ class PassageWalk:
             if made is not None:
                 made.walk(trace)
             count = int(trace.at[COUNT]) if made is None else made.done
-            for i in range(done, count):
-                flow = self._flow(trace, i) if made is None else made.flow(i)
-                if began is not None and trace.unit[i] >= 0:
-                    self._cross(trace, i, began, flow, made)
-                began = flow
-                if made is None:
-                    self._part_of(trace, i, flow)
-                    if self._short and self.reached is not None:
-                        return None
-                elif self._watch is not None:
-                    before = self._watched(trace, i, before, flow, made)
+            flows = [self._flow(trace, i) for i in range(done, count)] if made is None else made.flows[done:count]
+            self._cross(trace, done, began, flows, made)
+            began = flows[-1] if flows else began
+            if made is None and self._part <= periods:
+                self._part_of(trace, done, flows)
+                if self._short and self.reached is not None:
+                    return None
             if made is not None and count:
+                for i in range(done, count) if self._watch is not None else ():
+                    before = self._watched(trace, i, before, made)
                 if self.reached is None and made.has_reached:
                     self.reached = made.reached(self._part)
                 if before is None or self._watch is None:
@@ -180,7 +178,7 @@ class PassageWalk:
             done = 1
         return before
 
-    def _watched(self, trace: Trace, i: int, before: Before | None, flow: Flow, made: _Made) -> Before:
+    def _watched(self, trace: Trace, i: int, before: Before | None, made: _Made) -> Before:
         """Let the watch take event i and segment i. Returns the end of the segment."""
         begun, watch = made.begun(trace, i), self._watch
         assert watch is not None
@@ -192,43 +190,56 @@ class PassageWalk:
         return made.before(trace, i)
 
     def _flow(self, trace: Trace, i: int) -> Flow:
-        return self._dynamics.flow(trace.state[i].copy(), trace.open_force[i].copy())
+        return self._dynamics.flow(trace.state[i], trace.open_force[i])
 
-    def _cross(self, trace: Trace, i: int, old: Flow, new: Flow, made: _Made | None) -> None:
-        """Keep event i, if it is one by its name."""
-        struck = slice(trace.first[i], trace.first[i + 1])
-        name = self._names.event(old.named, new.named, trace.struck[struck])
-        start = trace.period[i] * self._frame.system.period + trace.time[i]
-        at_start = start <= SIMULTANEOUS * self._frame.system.period
-        if not name or (at_start and not trace.impulse[i].any()):
-            return
-        if made is not None:
-            speed = made.met(i)
-        else:  # that at which the contact meets whose event it is
-            met = trace.before[struck][trace.struck[struck] == trace.unit[i]]
-            speed = float(met[0]) if len(met) else np.nan
-        self._crossings.append(Crossing(float(start), name, speed, float(trace.loss[i])))
+    def _cross(self, trace: Trace, done: int, old: Flow | None, flows: list[Flow], made: _Made | None) -> None:
+        """Keep the events before segments from `done` on, in their flows, that are some by their names.
 
-    def _part_of(self, trace: Trace, i: int, flow: Flow) -> None:
-        """Keep the state at the part of a period that is wanted, if it lies in segment i."""
-        leg, k = leg_of(trace, i, self._frame.system.period), len(self._dynamics.scale)
-        after = self._part * self._frame.system.period - leg.start
-        if not 0.0 <= after <= leg.duration:
-            return
-        z = self._dynamics.extended(self._dynamics.state(leg), leg.time)
-        there = flow.series.course(z, np.zeros((len(z), 0)), after, False).last
-        state = self._dynamics.to_state @ there[: self._dynamics.one]
-        self.reached = state, np.full((k, k), np.nan), np.full((k, 0), np.nan)
+        old: the flow before these; None: there is none.
+        """
+        period, rows = self._frame.system.period, slice(done, done + len(flows))
+        first = trace.first[done : done + len(flows) + 1].tolist()
+        struck, before = trace.struck[: first[-1]].tolist(), trace.before[: first[-1]].tolist()
+        times = (trace.period[rows] * period + trace.time[rows]).tolist()
+        met = [np.nan] * len(flows) if made is None else made.met(rows)
+        for i, (unit, loss, time, new) in enumerate(
+            zip(trace.unit[rows].tolist(), trace.loss[rows].tolist(), times, flows, strict=True)
+        ):
+            hit, speed = struck[first[i] : first[i + 1]], met[i]
+            name = "" if old is None or unit < 0 else self._names.event(old, new, hit)
+            old = new
+            if not name or (time <= SIMULTANEOUS * period and not trace.impulse[done + i].any()):
+                continue
+            if made is None and unit in hit:  # at which the contact meets whose event it is
+                speed = before[first[i] + hit.index(unit)]
+            self._crossings.append(Crossing(time, name, speed, loss))
+
+    def _part_of(self, trace: Trace, done: int, flows: list[Flow]) -> None:
+        """Keep the state at the part of a period that is wanted, if it lies in a segment from `done` on."""
+        period, k = self._frame.system.period, len(self._dynamics.scale)
+        for i, flow in enumerate(flows, done):
+            leg = leg_of(trace, i, period)
+            after = self._part * period - leg.start
+            if 0.0 <= after <= leg.duration:
+                z = self._dynamics.extended(self._dynamics.state(leg), leg.time)
+                there = flow.series.course(z, np.zeros((len(z), 0)), after, False).last
+                state = self._dynamics.to_state @ there[: self._dynamics.one]
+                self.reached = state, np.full((k, k), np.nan), np.full((k, 0), np.nan)
+                if self._short:
+                    return
 
 
 class _Made:
-    """The derivative of a passage as it is made in compiled code, with what Python finds for that."""
+    """The derivative of a passage as it is made in compiled code, with what Python finds for that.
+
+    flows: of the segments of the present course.
+    """
 
     def __init__(
         self, table: FlowTable, state: np.ndarray, turns: np.ndarray | None, given: bool, watch: Watch | None
     ) -> None:
         self._table, self._dynamics, self._numbers = table, table.dynamics, table.numbers
-        self._flows = list[Flow]()
+        self.flows = list[Flow]()
         k, keeps = len(state), watch is not None
         self._walk = walk = table.walking(keeps)
         walk.at[:], walk.shifted[:], walk.shift[:], walk.turns[:], walk.reach[:] = 0, 0, 0.0, 0.0, 0.0
@@ -254,7 +265,7 @@ class _Made:
         while True:
             outcome = walk_along(*self.records(trace))
             # their places may be taken by others later
-            self._flows += [self._table.flows[place] for place in walk.flows[len(self._flows) : walk.at[NEXT]]]
+            self.flows += [self._table.flows[place] for place in walk.flows[len(self.flows) : walk.at[NEXT]]]
             if outcome == KNOWN:
                 return
             if outcome == WANTS_FLOW:
@@ -268,7 +279,7 @@ class _Made:
 
     def turn(self) -> None:
         """Go on with a course whose last segment is the first now."""
-        self._walk.at[NEXT], self._walk.at[LAW_OF], self._flows = 1, -1, self._flows[-1:]
+        self._walk.at[NEXT], self._walk.at[LAW_OF], self.flows = 1, -1, self.flows[-1:]
 
     @property
     def done(self) -> int:
@@ -276,13 +287,10 @@ class _Made:
         at = self._walk.at
         return int(at[NEXT])
 
-    def flow(self, i: int) -> Flow:
-        """Return the flow of segment i."""
-        return self._flows[i]
-
-    def met(self, i: int) -> float:
-        """Return the rate of the event function of event i."""
-        return float(self._walk.met[i])
+    def met(self, rows: slice) -> list[float]:
+        """Return the rates of the event functions of some events."""
+        rates: list[float] = self._walk.met[rows].tolist()
+        return rates
 
     def shift(self, i: int) -> np.ndarray:
         """Return how event i moves in time, (C,) s."""
@@ -297,14 +305,14 @@ class _Made:
         """Return the start of segment i."""
         leg = leg_of(trace, i, self._dynamics.system.period)
         z = self._dynamics.extended(self._dynamics.state(leg), leg.time)
-        return Before(leg, leg.event, self.flow(i), z, self._walk.begins[i].copy())
+        return Before(leg, leg.event, self.flows[i], z, self._walk.begins[i].copy())
 
     def before(self, trace: Trace, i: int) -> Before:
         """Return the end of segment i, of those that are not kept the last."""
         leg, walk, one = leg_of(trace, i, self._dynamics.system.period), self._walk, self._dynamics.one
         kept = walk.at[KEEPS]
         z, M = (walk.z_ends[i], walk.ends[i]) if kept else (walk.z, walk.end[:one])
-        return Before(leg, leg.event, self.flow(i), z.copy(), M.copy())
+        return Before(leg, leg.event, self.flows[i], z.copy(), M.copy())
 
     @property
     def has_reached(self) -> bool:
@@ -314,7 +322,7 @@ class _Made:
     def reached(self, part: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return state (k,) and derivatives (k, k), (k, P) at that part, in periods."""
         walk, one = self._walk, self._dynamics.one
-        flow = self._flows[int(walk.at[REACHED]) - 1]
+        flow = self.flows[int(walk.at[REACHED]) - 1]
         state = self._dynamics.to_state @ walk.z_reached[:one]
         return state, *self._after(flow, walk.z_reached, walk.reached[:one], part)
 

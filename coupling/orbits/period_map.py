@@ -21,6 +21,7 @@ from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.symmetry import Symmetry
 from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, run_from
 from vanedamp.coupling.engine.backends import engine_run
+from vanedamp.coupling.engine.trace import COUNT
 from vanedamp.coupling.methods.registry import check_waveform
 from vanedamp.coupling.model_order.choices import Choices, choices_of, with_choices
 from vanedamp.coupling.orbits.orbit_quantities import exponents_of, quantities_of
@@ -208,9 +209,12 @@ class PeriodMap:
         begun = fitted(system, at_speed_of(self.scene, start))
         run = engine_run(system, begun, records, False, EVENTS_PER_PERIOD * periods)
         states = [self.state_of(begun)]
-        while len(states) <= periods and run.advance_to(len(states)) is Status.OK:
-            if (state := run.final()) is None:
-                break
+        for trace in run.course(periods):
+            count = int(trace.at[COUNT])
+            for i in np.flatnonzero(trace.time[:count] == 0.0).tolist():
+                if trace.period[i] == len(states):  # what happens at that instant comes after it
+                    states.append(self._frame.to_state @ np.concatenate([trace.q[i], trace.v[i]]))
+        if run.status is Status.OK and (state := run.final()) is not None:
             states.append(self.state_of(state))
         return np.array(states), np.delete(records.section[: len(states)], 2, axis=1)
 

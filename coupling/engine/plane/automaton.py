@@ -26,6 +26,7 @@ from vanedamp.coupling.numerics.codes import (
     AT_HIGH,
     AT_LOW,
     AT_ONCE,
+    BEGUN,
     CLOSES,
     DONE,
     EVENT_BUDGET,
@@ -96,20 +97,22 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
     """Advance to the end of `periods`. Returns a code."""
     segments = 0
     while st.counters[PERIOD] < periods:
-        # before a segment begins: its beginning takes round-off away, which another beginning would take again
         if segments == SLICE or st.counters[LOGGED] + 4 * len(system.rest) >= len(rec.log):
             return PAUSED
         segments += 1
-        found = _begin_flow(system, flows, st, rec, scratch)
-        if found == STATES_OPEN:
-            continue
-        if found != STATES_GO_ON:
-            return found
+        if st.counters[BEGUN] == 0:  # once: it takes round-off away, which another beginning would take again
+            found = _begin_flow(system, flows, st, rec, scratch)
+            if found == STATES_OPEN:
+                continue
+            if found != STATES_GO_ON:
+                return found
+            st.counters[BEGUN] = 1
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
         if st.counters[PERIOD] == 0 and st.time[0] == 0.0:
             record_section(system, rec, st.counters[PERIOD], st.q, st.v, _spring_energy(system, st), st.ledger)
         tau, who = next_event(system, flows, st, watched)
+        st.counters[BEGUN] = 0
         if who == ENDLESS:
             return ILL_CONDITIONED
         if tau > 0.0:
