@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from tests.reference.fixed_sequence import FixedSequence
 from tests.tools.closed_form_scenes import ball, period_one_start, rubbing, scene
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_reduced, random_scene
+from tests.tools.sensitive_scenes import KINDS, numbers_of, scene_of
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.simulation import simulate
@@ -427,3 +429,23 @@ def test_crossings_come_in_order_with_their_losses():
     assert len(crossings) > 1 and all(one.time < other.time for one, other in itertools.pairwise(crossings))
     run = simulate(mapped.scene.replace({"time.periods": 1, "time.transient": 0}), start=mapped.restart_of(state))
     assert sum(crossing.energy for crossing in crossings) == pytest.approx(run.energy["impact"], rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(len(KINDS)))
+def test_passages_do_not_depend_on_those_before(seed, tmp_path):
+    """Of other states, lengths and numbers: a map keeps its run, its flows and room for derivatives."""
+    try:
+        _, scene = scene_of(seed, tmp_path)
+        found = period_map(scene)
+    except InputError:
+        pytest.skip("no scene")
+    one = found.linear_orbit()
+    other = one + 0.3 * found.scale * np.random.default_rng(seed).normal(size=len(one))
+    path = list(numbers_of(scene, False))[:2]
+    for state in (one, other, one):
+        for made in (found, found.over(2), found.by(tuple(path))):
+            fresh = replace(made, _earlier=[])(state)
+            again = made(state)
+            assert again.status is fresh.status and again.crossings == fresh.crossings
+            for name in ("state", "derivative", "by_number", "peaks"):
+                assert np.array_equal(getattr(again, name), getattr(fresh, name), equal_nan=True)
