@@ -23,8 +23,9 @@ from vanedamp.coupling.derivatives.matrices import (
     vector,
 )
 from vanedamp.coupling.derivatives.walking import SPEEDS
-from vanedamp.coupling.numerics.codes import CLOSED, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
+from vanedamp.coupling.numerics.codes import CLOSED, OPEN, STICK
 from vanedamp.coupling.numerics.compiler.jit import counting, inlined
+from vanedamp.coupling.system.unit_kinematics import is_slip
 
 
 class Map(NamedTuple):
@@ -39,12 +40,6 @@ class Map(NamedTuple):
 def presses(state):
     """Return whether a contact in a state is closed with a force of its own."""
     return state < OPEN or state == CLOSED
-
-
-@inlined
-def slips(state):
-    """Return whether a unit in a state slips; the state is the direction then, as a factor."""
-    return state == SLIP_LEFT or state == SLIP_RIGHT
 
 
 @counting
@@ -136,7 +131,7 @@ def followed(room, eq, turns, state, z):
             found.places[at, k], found.rates[at, k] = eq.follows[j, k], eq.follows[j, size + k]
         for p in range(turns.numbers):
             found.own[at, p] = dot(turns.follows[p, j, :size], z)
-            if slips(way):
+            if is_slip(way):
                 found.own[at, p] -= way * turns.bound[p, j]
             found.own[size + at, p] = dot(turns.follows[p, j, size:], z[size:])
     return found

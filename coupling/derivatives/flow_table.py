@@ -19,6 +19,8 @@ from vanedamp.coupling.numerics.compiler.record import room
 
 #: bytes that flows may take before the one that was used least lately goes
 _MOST = 1 << 28
+#: bytes of what is kept of a course
+_KEPT = 1 << 26
 #: matrices that an event takes at most, and points of a motion
 _MATRICES, _POINTS = 200, 300
 
@@ -33,9 +35,10 @@ class FlowTable:
         self.dynamics, self.numbers = dynamics, numbers
         self.equations, self.turns = equations_of(dynamics), turns_of(dynamics, numbers)
         self.flows = list[Flow]()
-        self.segments = SEGMENTS
         eq, count = self.equations, self.turns.numbers
         k, K, units = len(eq.scale), len(eq.typical), len(eq.rest)
+        #: of a course: derivatives at both ends of each take some room
+        self.segments = int(np.clip(_KEPT // max(16 * len(eq.unit) * (k + count), 1), 8, SEGMENTS))
         long, wide = max(K, 2 * units, k), max(K, 2 * units, k + count)
         moved = np.abs(dynamics.from_state) * eq.scale
         #: sizes (2N,) by which coordinates are compared that hardly move, and their largest derivatives at the start

@@ -60,11 +60,6 @@ class Series:
         number, at, of = np.nonzero(D)
         self._D, self._numbers = (number, at, of, D[number, at, of]), len(D)
 
-    def power(self, step: float) -> np.ndarray:
-        """Return exp(X step) (K, K)."""
-        eye = np.eye(len(self.X))
-        return self.alone.course(eye[0], eye, step, False).end
-
     def pieces(self, z: np.ndarray, Z: np.ndarray, duration: float) -> Iterator[tuple[float, float, Course]]:
         """Yield start, end and course, with nodes, of the pieces of a motion from z (K,), Z (K, P) over a duration, s.
 

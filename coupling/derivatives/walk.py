@@ -35,7 +35,7 @@ from vanedamp.coupling.derivatives.walking import (
     WANTS_ROOM,
 )
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
-from vanedamp.coupling.engine.trace import COUNT, Leg, Trace, leg_of
+from vanedamp.coupling.engine.trace import COUNT, SEGMENTS, Leg, Trace, leg_of
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import fitted
@@ -154,7 +154,7 @@ class PassageWalk:
     def _walked(self, run: EventRun, periods: int, made: _Made | None) -> Before | None:
         """Walk to the end. Returns the end of the last segment, None without any."""
         done, before, began = 0, None, None
-        for trace in run.course(periods):
+        for trace in run.course(periods, SEGMENTS if made is None else made.segments):
             if made is not None:
                 made.walk(trace)
             count = int(trace.at[COUNT]) if made is None else made.done
@@ -250,6 +250,11 @@ class _Made:
         if turns is not None:
             walk.turns[:] = turns
         walk.size[:], walk.reach[:, 0] = table.least, table.reach
+
+    @property
+    def segments(self) -> int:
+        """Segments of a course that there is room for."""
+        return self._table.segments
 
     def until(self, time: float, short: bool) -> None:
         """Keep what there is at a time after the start, s; short: and end there."""

@@ -12,6 +12,7 @@ import numpy as np
 from vanedamp.coupling.engine.columns import STARTS, Columns, repeated
 from vanedamp.coupling.engine.known import IllConditioned, Known, with_place
 from vanedamp.coupling.engine.scenes import CODE, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job
+from vanedamp.coupling.engine.trace import SEGMENTS as COURSE
 from vanedamp.coupling.engine.trace import UNTRACED, Trace, clear, new_trace, turned
 from vanedamp.coupling.numerics.codes import (
     DONE,
@@ -199,14 +200,14 @@ class EventDrivenRun(ABC):
         self.ended = code != DONE
         return STATUS_OF[code]
 
-    def course(self, periods: int) -> Iterator[Trace]:
+    def course(self, periods: int, segments: int = COURSE) -> Iterator[Trace]:
         """Run to the end of `periods` from the start. Yield the course whenever it is full, and at the end.
 
-        status: how the run has ended.
+        segments: of a full course; status: how the run has ended.
         """
         self.check()
-        if not len(self.trace.time):
-            self.trace = new_trace(self.whole, self.rows_of_trace(), len(self.log))
+        if len(self.trace.time) != segments:
+            self.trace = new_trace(self.whole, self.rows_of_trace(), len(self.log), segments)
         clear(self.trace)
         self.begun = True
         while True:

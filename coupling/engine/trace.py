@@ -73,7 +73,7 @@ def _of_sizes(sizes: dict[str, int], rows: np.ndarray, fastest: float) -> Trace:
 UNTRACED = _of_sizes(dict.fromkeys(("s", "m", "m1", "u", "N", "h"), 0), np.zeros(0, int), 0.0)
 
 
-def new_trace(system: System, rows: np.ndarray, entries: int, segments: int = SEGMENTS) -> Trace:
+def new_trace(system: System, rows: np.ndarray, entries: int, segments: int) -> Trace:
     """Return an empty course of so many segments. rows: as there; entries: of the run's log."""
     sizes = {"s": segments, "m": segments + 1, "m1": segments + 2, "h": entries + 4 * segments}
     return _of_sizes(sizes | {"u": len(system.rest), "N": len(system.mass)}, rows, system.speed)

@@ -152,7 +152,7 @@ class EventRun(Run, Protocol):
     trace: Any
     status: Status
 
-    def course(self, periods: int) -> Iterator[Any]:
+    def course(self, periods: int, segments: int = ...) -> Iterator[Any]:
         """Run to the end of `periods` from the start. Yield the course whenever it is full, and at the end."""
 
     def begin_from(self, start: RestartState) -> None:

@@ -83,10 +83,11 @@ def test_friction_at_a_bound_opposes_the_slip_that_follows(bound):
 #: Compiled functions of the engines set up their functions by the code; complementarity has the bounds of its own rows
 NAMED = {
     "coupling/system/unit_laws.py": 12, "coupling/numerics/complementarity.py": 12,
-    "coupling/derivatives/derivative.py": 5, "coupling/system/unit_kinematics.py": 2,
+    "coupling/derivatives/saltation.py": 4, "coupling/system/unit_kinematics.py": 2,
     "coupling/engine/line/automaton.py": 4, "coupling/engine/line/compliant_contacts.py": 11,
     "coupling/engine/line/contact_states.py": 10, "coupling/engine/line/event_driven.py": 3,
     "coupling/engine/line/event_functions.py": 16, "coupling/engine/line/impacts.py": 1,
+    "coupling/engine/line/tracing.py": 3,
     "coupling/engine/plane/automaton.py": 13, "coupling/engine/plane/event_functions.py": 10,
     "coupling/engine/plane/subsystems.py": 2, "coupling/engine/plane/scenes.py": 1,
 }  # fmt: skip
