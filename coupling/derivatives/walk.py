@@ -159,12 +159,12 @@ class PassageWalk:
                 made.walk(trace)
             count = int(trace.at[COUNT]) if made is None else made.done
             flows = [self._flow(trace, i) for i in range(done, count)] if made is None else made.flows[done:count]
+            if made is None and self._part <= periods:
+                flows = flows[: self._part_of(trace, done, flows)]
             self._cross(trace, done, began, flows, made)
             began = flows[-1] if flows else began
-            if made is None and self._part <= periods:
-                self._part_of(trace, done, flows)
-                if self._short and self.reached is not None:
-                    return None
+            if made is None and self._short and self.reached is not None:
+                return None
             if made is not None and count:
                 for i in range(done, count) if self._watch is not None else ():
                     before = self._watched(trace, i, before, made)
@@ -214,8 +214,11 @@ class PassageWalk:
                 speed = before[first[i] + hit.index(unit)]
             self._crossings.append(Crossing(time, name, speed, loss))
 
-    def _part_of(self, trace: Trace, done: int, flows: list[Flow]) -> None:
-        """Keep the state at the part of a period that is wanted, if it lies in a segment from `done` on."""
+    def _part_of(self, trace: Trace, done: int, flows: list[Flow]) -> int:
+        """Keep the state at the part of a period that is wanted, if it lies in a segment from `done` on.
+
+        Returns how many of them the passage has.
+        """
         period, k = self._frame.system.period, len(self._dynamics.scale)
         for i, flow in enumerate(flows, done):
             leg = leg_of(trace, i, period)
@@ -226,7 +229,8 @@ class PassageWalk:
                 state = self._dynamics.to_state @ there[: self._dynamics.one]
                 self.reached = state, np.full((k, k), np.nan), np.full((k, 0), np.nan)
                 if self._short:
-                    return
+                    return i + 1 - done
+        return len(flows)
 
 
 class _Made:
