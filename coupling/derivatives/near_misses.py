@@ -61,7 +61,7 @@ def _motion(room, flows, walk, f, z, step, steps):
     """Return the motion (n + 1, K) from z at points a step apart."""
     size = len(z)
     power, found, start = unit(room, size), matrix(room, steps + 1, size), vector(room, size)
-    follow(flows, f, size, start, power, step, walk.terms, walk.of_terms)
+    follow(room, flows, f, size, start, power, step, walk.terms, walk.of_terms)
     for i in range(size):
         found[0, i] = z[i]
     for p in range(1, steps + 1):
@@ -80,7 +80,7 @@ def _minimum(room, flows, walk, f, row, z, share, step):
     for _ in range(_STEPS):
         for i in range(len(z)):
             now[i] = z[i]
-        follow(flows, f, ZERO, now, nothing, at, walk.terms, walk.of_terms)
+        follow(room, flows, f, ZERO, now, nothing, at, walk.terms, walk.of_terms)
         tilt, bend = dot(slopes, now), dot(bends, now)
         if tilt < 0.0:
             low = at

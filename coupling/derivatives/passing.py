@@ -104,7 +104,7 @@ def _pass_segment(room, eq, turns, flows, walk, trace, i):
             worsen(walk, GRAZING)
     _begin(eq, turns, walk, trace, i, walk.end)
     copy(walk.z, z)
-    follow(flows, f, k, walk.z, walk.end, trace.duration[i], walk.terms, walk.of_terms)
+    follow(room, flows, f, k, walk.z, walk.end, trace.duration[i], walk.terms, walk.of_terms)
     if at[KEEPS]:
         copy(walk.z_ends[i], walk.z)
         copy(walk.shifts[i], walk.shift)
@@ -136,7 +136,7 @@ def _part(room, eq, turns, flows, walk, trace, i, f, z):
     _begin(eq, turns, walk, trace, i, walk.reached)
     copy(walk.z_reached, z)
     follow(
-        flows, f, len(eq.scale), walk.z_reached, walk.reached, walk.part[0] - start, walk.terms, walk.of_terms
+        room, flows, f, len(eq.scale), walk.z_reached, walk.reached, walk.part[0] - start, walk.terms, walk.of_terms
     )  # fmt: skip
     walk.at[REACHED] = i + 1
 

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import matrix_balance
 
-from vanedamp.coupling.numerics.compiler.jit import counting, entry, kernel
+from vanedamp.coupling.derivatives.matrices import matrix, product, unit, vector
+from vanedamp.coupling.numerics.compiler.jit import ZERO, counting, entry, kernel
 
 #: norm of X, balanced, over a panel, and terms of a series then: 3^32/32! < 1e-19
 _NORM, TERMS = 3.0, 32
@@ -153,13 +154,54 @@ def panels_of(norm, duration):
 
 
 @counting
-def follow(flows, f, first, z, Z, duration, a, b):
-    """Advance z (K,) and Z (K, p) of flow f over a duration, s. first: column of the first number, or beyond."""
+def follow(room, flows, f, first, z, Z, duration, a, b):
+    """Advance z (K,) and Z (K, p) of flow f over a duration, s. first: column of the first number, or beyond.
+
+    Columns that no number changes go by a power of the step's exponential where that takes fewer operations than their
+    series at every panel.
+    """
+    panels, (size, columns) = panels_of(flows.norm[f], duration), Z.shape
+    plain, each = min(first, columns), TERMS * (flows.counts[f, 0] + size)
+    if each * size + 2.0 * math.log2(panels) * size**3 >= 1.0 * panels * each * plain:
+        _step(flows, f, first, z, Z, duration / panels, panels, a, b)
+        return
+    power = _power(room, flows, f, duration / panels, panels, a, b)
+    alone, rest = matrix(room, size, plain), matrix(room, size, columns - plain)
+    for i in range(size):
+        for c in range(columns):
+            if c < plain:
+                alone[i, c] = Z[i, c]
+            else:
+                rest[i, c - plain] = Z[i, c]
+    alone = product(room, power, alone)
+    _step(flows, f, ZERO, z, rest, duration / panels, panels, a, b)
+    for i in range(size):
+        for c in range(columns):
+            Z[i, c] = alone[i, c] if c < plain else rest[i, c - plain]
+
+
+@counting
+def _step(flows, f, first, z, Z, step, panels, a, b):
+    """Advance z and Z of flow f over panels by their series."""
     n, d = flows.counts[f, 0], flows.counts[f, 1] if first < Z.shape[1] else 0
-    panels = panels_of(flows.norm[f], duration)
     for _ in range(panels):
         set_terms(
             flows.row[f, :n], flows.column[f, :n], flows.x[f, :n], flows.number[f, :d], flows.to[f, :d],
-            flows.of[f, :d], flows.d[f, :d], first, z, Z, duration / panels, a, b,
+            flows.of[f, :d], flows.d[f, :d], first, z, Z, step, a, b,
         )  # fmt: skip
         set_sums(a, b, 1.0, z, Z)
+
+
+@counting
+def _power(room, flows, f, step, panels, a, b):
+    """Return the exponential (K, K) of flow f over panels: a power of that over one."""
+    size = flows.forces.shape[2]
+    base, found, left = unit(room, size), unit(room, size), panels
+    _step(flows, f, size, vector(room, size), base, step, ZERO + 1, a, b)
+    while left > 0:
+        if left % 2 == 1:
+            found = product(room, found, base)
+        left //= 2
+        if left > 0:
+            base = product(room, base, base)
+    return found
