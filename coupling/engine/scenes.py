@@ -155,10 +155,10 @@ def run_scene(
 
 
 @kernel
-def take_numbers(columns, base, flows, setup, measured, k, linked, same):
+def take_numbers(columns, base, flows, setup, measured, k, linked, same, first):
     """Set what differs between scenes to the numbers of scene k; flows of other forces are to be filled again.
 
-    same: whether an engine's own numbers that enter flows are those that were.
+    first: row of the first contact, which is the first unit; same: whether an engine's own numbers that enter flows are those that were.
     """
     same = copy(base.frequency, columns.frequency[k]) and same
     copy(base.rest, columns.rest[k])
@@ -179,9 +179,8 @@ def take_numbers(columns, base, flows, setup, measured, k, linked, same):
         setup.q[i] = columns.displacement[k, i] / base.scale
         setup.v[i] = columns.velocity[k, i] / base.scale
     copy(measured.holds, columns.holds[k])
-    behind = len(base.rest) - len(measured.rest)
-    for u in range(len(measured.rest)):
-        measured.rest[u], measured.play[u] = base.rest[behind + u], base.play[behind + u]
+    for u in range(len(base.rest) - first):
+        measured.rest[u], measured.play[u] = base.rest[first + u], base.play[first + u]
 
 
 @kernel

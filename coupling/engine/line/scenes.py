@@ -48,7 +48,7 @@ def _fill_known(system, subsystems, st, flows, assembly):
 @kernel
 def _take_numbers(columns, base, flows, setup, measured, k, linked):
     """Set what differs between scenes (engine.scenes.take_numbers)."""
-    take_numbers(columns, base, flows, setup, measured, k, linked, True)
+    take_numbers(columns, base, flows, setup, measured, k, linked, True, base.friction_rows)
 
 
 @kernel

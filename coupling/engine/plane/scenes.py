@@ -10,7 +10,7 @@ from vanedamp.coupling.engine.plane.flow_assembly import fill, is_in_states
 from vanedamp.coupling.engine.plane.tracing import note_event, note_segment
 from vanedamp.coupling.engine.scenes import ON, PLACE, copy, run_scene, take_numbers, take_scene
 from vanedamp.coupling.numerics.codes import DONE, LEAVING, OPEN, SLIP_RIGHT
-from vanedamp.coupling.numerics.compiler.jit import entry, kernel, strict
+from vanedamp.coupling.numerics.compiler.jit import ZERO, entry, kernel, strict
 from vanedamp.coupling.numerics.compiler.record import changed
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
 from vanedamp.coupling.system.unit_kinematics import gap, is_compliant
@@ -51,7 +51,7 @@ def _take_numbers(columns, base, flows, setup, measured, k, linked):
     same = copy(base.rest, columns.rest[k])
     same = copy(base.friction, columns.friction[k]) and same
     same = copy(base.limit, columns.limit[k]) and same
-    take_numbers(columns, base, flows, setup, measured, k, linked, same)
+    take_numbers(columns, base, flows, setup, measured, k, linked, same, ZERO)
 
 
 @kernel

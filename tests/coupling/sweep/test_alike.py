@@ -57,6 +57,13 @@ _POINTS = {
         },
         [{"excitation.frequency": f, "damper.friction": m} for f in (15.2, 15.9, 16.3) for m in (0.0, 0.2)],
     ),
+    "a body in flight, a structure that friction holds": (
+        _ONE | {
+            "damper": [{"cavity": "c", "mass": 0.05, "position": 2e-3}],
+            "friction_damper": [{"normal_force": 2.0, "friction": 0.3}],
+        },
+        [{"excitation.force": f} for f in (0.1, 0.2)],
+    ),
     "with and without friction": (_ONE, [{"damper.0.friction": m} for m in (0.0, 0.1, 0.0, 1e-10, 0.3)]),
     "few events": (_ONE | {"solver": {"max_events": 40}}, [{"excitation.frequency": f} for f in (15.0, 15.9, 16.4)]),
     "rows that begin spread": (
