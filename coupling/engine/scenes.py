@@ -158,7 +158,8 @@ def run_scene(
 def take_numbers(columns, base, flows, setup, measured, k, linked, same, first):
     """Set what differs between scenes to the numbers of scene k; flows of other forces are to be filled again.
 
-    first: row of the first contact, which is the first unit; same: whether an engine's own numbers that enter flows are those that were.
+    first: row of the first contact, which is the first unit; same: whether an engine's own numbers that enter flows
+    are those that were.
     """
     same = copy(base.frequency, columns.frequency[k]) and same
     copy(base.rest, columns.rest[k])
