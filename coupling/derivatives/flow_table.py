@@ -14,7 +14,7 @@ from vanedamp.coupling.derivatives.numbers import Numbers
 from vanedamp.coupling.derivatives.saltation import LEAST
 from vanedamp.coupling.derivatives.series import TERMS
 from vanedamp.coupling.derivatives.walking import WALKING, Walking
-from vanedamp.coupling.engine.trace import SEGMENTS
+from vanedamp.coupling.engine.trace import COURSE
 from vanedamp.coupling.numerics.compiler.record import room
 
 #: bytes that flows may take before the one that was used least lately goes
@@ -38,13 +38,13 @@ class FlowTable:
         eq, count = self.equations, self.turns.numbers
         k, K, units = len(eq.scale), len(eq.typical), len(eq.rest)
         #: of a course: derivatives at both ends of each take some room
-        self.segments = int(np.clip(_KEPT // max(16 * len(eq.unit) * (k + count), 1), 8, SEGMENTS))
+        self.segments = int(np.clip(_KEPT // max(16 * len(eq.unit) * (k + count), 1), 8, COURSE))
         long, wide = max(K, 2 * units, k), max(K, 2 * units, k + count)
         moved = np.abs(dynamics.from_state) * eq.scale
         #: sizes (2N,) by which coordinates are compared that hardly move, and their largest derivatives at the start
         self.least, self.reach = LEAST * moved.sum(axis=1), moved.max(axis=1, initial=0.0)
         self._walking: dict[bool, Walking] = {}
-        #: of compiled functions: they take some forty matrices at an event, and a motion at its points
+        #: of compiled functions
         self.room = new_room(_MATRICES * long * wide + _POINTS * K)
         self.stack = self._room(4, 16, 16 if numbers is not None else 0, 8)
 
@@ -84,12 +84,9 @@ class FlowTable:
         stack.used[place] = stack.clock[0]
         stack.counts[place] = len(x), len(d), len(events)
         stack.state[place], stack.open_force[place], stack.way[place] = state, open_force, flow.way
-        stack.slips_held[place], stack.stuck[place], stack.most[place] = (
-            flow.slips_held,
-            flow.stuck,
-            flow.possible_forces,
-        )
-        stack.forces[place], stack.norm[place], stack.fastest[place] = flow.forces, flow.series.norm, flow.fastest
+        stack.slips_held[place], stack.stuck[place] = flow.slips_held, flow.stuck
+        stack.most[place], stack.forces[place] = flow.possible_forces, flow.forces
+        stack.norm[place], stack.fastest[place] = flow.series.norm, flow.fastest
         if self.numbers is not None:
             stack.of_forces[place] = derivative_of(flow, self.numbers).forces
         for name, part in zip(("x", "row", "column"), (flow.X[tuple(x.T)], *x.T), strict=True):

@@ -41,6 +41,7 @@ from vanedamp.coupling.derivatives.walking import (
     WANTS_LAW,
     WANTS_ROOM,
 )
+from vanedamp.coupling.engine.trace import COUNT
 from vanedamp.coupling.numerics.compiler.jit import counting, counting_entry
 
 
@@ -48,7 +49,7 @@ from vanedamp.coupling.numerics.compiler.jit import counting, counting_entry
 def walk_along(eq, turns, flows, trace, walk, room):
     """Go on along a course. Returns KNOWN at its present end, or what Python is to find first (saltation)."""
     at = walk.at
-    while at[NEXT] < trace.at[0]:
+    while at[NEXT] < trace.at[COUNT]:
         i = at[NEXT]
         outcome = _pass_segment(room, eq, turns, flows, walk, trace, i)
         if room.used[2] != 0:

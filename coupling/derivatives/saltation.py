@@ -153,12 +153,12 @@ def agrees(room, eq, walk, predicted, found):
 @counting
 def _guards_of(room, eq, turns, flows, walk, trace, i, z, moving):
     """Return the event functions that vanish at event i, of which the first is its own."""
-    units, e, f = len(eq.rest), i, walk.at[FLOW]
-    unit_, what, time = trace.unit[e], trace.what[e], start_of(eq, trace, i - 1) + trace.duration[i - 1]
+    units, f = len(eq.rest), walk.at[FLOW]
+    unit_, what, time = trace.unit[i], trace.what[i], start_of(eq, trace, i - 1) + trace.duration[i - 1]
     more, count = integers(room, units), 1
     for r in range(units):
         struck = False
-        for h in range(trace.first[e], trace.first[e + 1]):
+        for h in range(trace.first[i], trace.first[i + 1]):
             struck = struck or trace.struck[h] == r
         if struck and eq.spring[r] == math.inf and trace.state[i - 1, r] == OPEN and r != unit_:
             more[r] = CLOSES
@@ -179,7 +179,7 @@ def _guards_of(room, eq, turns, flows, walk, trace, i, z, moving):
             continue
         met = math.nan
         if code == CLOSES:
-            for h in range(trace.first[e], trace.first[e + 1]):
+            for h in range(trace.first[i], trace.first[i + 1]):
                 if trace.struck[h] == r:
                     met = trace.before[h]
         set_guard(
@@ -196,24 +196,24 @@ def _jump(room, eq, turns, walk, trace, i, before, z):
 
     before, z: (K,) before and after.
     """
-    size, units, e = len(eq.root), len(eq.rest), i
+    size, units = len(eq.root), len(eq.rest)
     found = Map(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.numbers))
     w, w_new = before[size : 2 * size], z[size : 2 * size]
     kick, hits, struck = vector(room, size), False, vector(room, size)
     for r in range(2 * units):
-        if trace.impulse[e, r] != 0.0:
+        if trace.impulse[i, r] != 0.0:
             hits = True
             for k in range(size):
-                kick[k] += trace.impulse[e, r] * eq.rows[r, k]
+                kick[k] += trace.impulse[i, r] * eq.rows[r, k]
     for k in range(size):
         struck[k] = w[k]
     if hits:
         v = vector(room, size)
         for k in range(size):
             v[k] = w[k] / eq.root[k]
-        jump = impact(room, eq, turns, trace, e, walk.law, v, trace.speed[i - 1])
-        bound = _LAW * fastest_of(trace, e) + ROUND_OFF * trace.speed[i - 1]
-        for h in range(trace.first[e], trace.first[e + 1]):
+        jump = impact(room, eq, turns, trace, i, walk.law, v, trace.speed[i - 1])
+        bound = _LAW * fastest_of(trace, i) + ROUND_OFF * trace.speed[i - 1]
+        for h in range(trace.first[i], trace.first[i + 1]):
             r = trace.struck[h]
             if eq.spring[r] < math.inf:
                 continue
@@ -239,8 +239,8 @@ def _jump(room, eq, turns, walk, trace, i, before, z):
     follow = followed(room, eq, turns, trace.state[i], after)
     found = _on_rates(room, found, follow)
     known = True
-    for h in range(trace.first[e], trace.first[e + 1]):
-        for other in range(h + 1, trace.first[e + 1]):
+    for h in range(trace.first[i], trace.first[i + 1]):
+        for other in range(h + 1, trace.first[i + 1]):
             known = known and trace.struck[h] != trace.struck[other]
     by_law, by_impulse, sum_ = vector(room, 2 * size), vector(room, 2 * size), vector(room, size)
     for k in range(size):
@@ -298,12 +298,12 @@ def _on_rates(room, one, other):
 @counting
 def after_event(room, eq, turns, flows, walk, trace, i, f, z):
     """Return the derivative (2N, C) after event i as the motion goes on from z (K,) in flow f, and what came of it."""
-    e, before, M, one = i, walk.z, walk.end[: len(eq.unit)], len(eq.unit)
+    before, M, one = walk.z, walk.end[: len(eq.unit)], len(eq.unit)
     for c in range(len(walk.shift)):
         walk.shift[c] = 0.0
-    if trace.unit[e] < 0:
+    if trace.unit[i] < 0:
         return M, KNOWN if agrees(room, eq, walk, before, z) else UNTRUSTED
-    if eq.law and walk.at[LAW_OF] != e and trace.first[e] < trace.first[e + 1]:
+    if eq.law and walk.at[LAW_OF] != i and trace.first[i] < trace.first[i + 1]:
         return M, WANTS_LAW
     moving = vector(room, len(z))
     generated(flows, walk.at[FLOW], before, moving)
@@ -319,9 +319,9 @@ def after_event(room, eq, turns, flows, walk, trace, i, f, z):
             room, begun(room, eq, turns, trace.state[i], closed_at(room, eq, trace, i), z), applied(room, jump, M)
         )  # fmt: skip
         # a gap that round-off has opened closes at once, without speed
-        met = abs(dot(eq.speed[trace.unit[e]], before))
-        rests = eq.spring[trace.unit[e]] == math.inf and met <= ROUND_OFF * trace.speed[i - 1]
-        if eq.order[trace.what[e]] == POSITION and not rests:
+        met = abs(dot(eq.speed[trace.unit[i]], before))
+        rests = eq.spring[trace.unit[i]] == math.inf and met <= ROUND_OFF * trace.speed[i - 1]
+        if eq.order[trace.what[i]] == POSITION and not rests:
             worsen(walk, GRAZING)
     else:
         moved, outcome = _saltation(
@@ -336,8 +336,8 @@ def after_event(room, eq, turns, flows, walk, trace, i, f, z):
     for r in range(len(eq.rest)):
         if trace.state[i - 1, r] != trace.state[i, r]:
             walk.took_part[r] = start_of(eq, trace, i)
-    walk.took_part[trace.unit[e]] = start_of(eq, trace, i)
-    for h in range(trace.first[e], trace.first[e + 1]):
+    walk.took_part[trace.unit[i]] = start_of(eq, trace, i)
+    for h in range(trace.first[i], trace.first[i + 1]):
         walk.took_part[trace.struck[h]] = start_of(eq, trace, i)
     return moved[:one], KNOWN
 
@@ -349,12 +349,12 @@ def _saltation(room, eq, turns, flows, walk, trace, i, f, z, M, moving, jump, ju
     z: (K,) after; moving: X z before; jumped: (N,) of w. Parts of the system that do not feel each other have their own
     events.
     """
-    size, one, e, columns, units = len(eq.root), len(eq.unit), i, M.shape[1], len(eq.rest)
-    what, count, parts = trace.what[e], len(guards.rate), walk.last_shift.shape[0]
+    size, one, columns, units = len(eq.root), len(eq.unit), M.shape[1], len(eq.rest)
+    what, count, parts = trace.what[i], len(guards.rate), walk.last_shift.shape[0]
     after, kick, hits = vector(room, len(z)), vector(room, one), False
     generated(flows, f, z, after)
     for r in range(2 * units):
-        hits = hits or trace.impulse[e, r] != 0.0
+        hits = hits or trace.impulse[i, r] != 0.0
     of_force = eq.order[what] == FORCE
     round_off = _CONTINUOUS if of_force else ROUND_OFF
     for k in range(one):
@@ -391,7 +391,7 @@ def _saltation(room, eq, turns, flows, walk, trace, i, f, z, M, moving, jump, ju
             difference[k, c] = -kick[k] * shifts[owner, c]
             moved[k, c] = unmoved[k, c] + difference[k, c]
     matters = hits or largest(room, eq, difference) > _NOTHING * max(largest(room, eq, M), 1.0)
-    if what == CLOSES and eq.spring[trace.unit[e]] < math.inf:
+    if what == CLOSES and eq.spring[trace.unit[i]] < math.inf:
         begin = 0
         for r in range(units):
             yields = eq.spring[r] < math.inf and presses(trace.state[i, r]) and trace.state[i - 1, r] == OPEN
@@ -409,7 +409,7 @@ def _saltation(room, eq, turns, flows, walk, trace, i, f, z, M, moving, jump, ju
             worsen(walk, GRAZING)
     closed = closed_at(room, eq, trace, i)
     stopped, shut = True, True
-    for h in range(trace.first[e], trace.first[e + 1]):
+    for h in range(trace.first[i], trace.first[i + 1]):
         stopped = stopped and trace.after[h] == 0.0
         shut = shut and closed[trace.struck[h]]
     rests = what == CLOSES and count > 1 and (stopped or shut)

@@ -35,7 +35,7 @@ from vanedamp.coupling.derivatives.walking import (
     WANTS_ROOM,
 )
 from vanedamp.coupling.engine.backends import engine_run, reuse_subsystems
-from vanedamp.coupling.engine.trace import COUNT, SEGMENTS, Leg, Trace, leg_of
+from vanedamp.coupling.engine.trace import COUNT, COURSE, Leg, Trace, leg_of
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import fitted
@@ -154,7 +154,7 @@ class PassageWalk:
     def _walked(self, run: EventRun, periods: int, made: _Made | None) -> Before | None:
         """Walk to the end. Returns the end of the last segment, None without any."""
         done, before, began = 0, None, None
-        for trace in run.course(periods, SEGMENTS if made is None else made.segments):
+        for trace in run.course(periods, COURSE if made is None else made.segments):
             if made is not None:
                 made.walk(trace)
             count = int(trace.at[COUNT]) if made is None else made.done

@@ -12,8 +12,7 @@ import numpy as np
 from vanedamp.coupling.engine.columns import STARTS, Columns, repeated
 from vanedamp.coupling.engine.known import IllConditioned, Known, with_place
 from vanedamp.coupling.engine.scenes import CODE, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job
-from vanedamp.coupling.engine.trace import SEGMENTS as COURSE
-from vanedamp.coupling.engine.trace import UNTRACED, Trace, clear, new_trace, turned
+from vanedamp.coupling.engine.trace import COURSE, UNTRACED, Trace, clear, new_trace, turned
 from vanedamp.coupling.numerics.codes import (
     DONE,
     EVALUATIONS,

@@ -28,7 +28,7 @@ from vanedamp.coupling.response.segment import Event
 from vanedamp.coupling.system.system import System
 
 #: segments that are kept at once
-SEGMENTS = 256
+COURSE = 256
 
 # numbers of a course: segments, and contacts struck in the events so far; whether the present segment has begun, or is
 # written down; whether the start is; what the present call goes on to, and whether it has gone; reduced impacts as the

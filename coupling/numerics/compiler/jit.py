@@ -61,8 +61,6 @@ summing: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contra
 comparing: _Decorator = njit(
     **_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, **COMPILERS["loops"]
 )
-
-
 #: a kernel that returns parts of arrays, whose references are counted
 counting: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"_nrt": True}, **COMPILERS["kernel"])
 
