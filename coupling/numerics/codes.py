@@ -51,9 +51,9 @@ STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
     NOT_STEADY, LONGER, OUTSIDE, UNCERTAIN, TRACED,
 ) = range(40, 54)  # fmt: skip
 
-# counters of a run, of any method; BEGUN: whether the present segment of bodies in the plane has begun
+# counters of a run, of any method; BEGUN: whether the present segment of bodies in the plane has begun; ASLEEP: bodies
 (
     PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, ACTIVE, CARRIED, CLOSED_ROWS, STEPS,
-    SOLVES, AT_ONCE, REDUCED, BEGUN,
-) = range(16)  # fmt: skip
-COUNTERS = 16
+    SOLVES, AT_ONCE, REDUCED, BEGUN, ASLEEP,
+) = range(17)  # fmt: skip
+COUNTERS = 17

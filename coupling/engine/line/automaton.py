@@ -36,11 +36,13 @@ from vanedamp.coupling.engine.line.gap_kinematics import (
 )
 from vanedamp.coupling.engine.line.impacts import all_in_flight, simultaneous_impacts, single_impact
 from vanedamp.coupling.engine.line.recording import record_start, structure_state
+from vanedamp.coupling.engine.line.sleeping import show_sleepers, spend_on_friction, spend_on_impulses, wake_all
 from vanedamp.coupling.engine.line.tolerances import INACTIVE, OVERLAP
 from vanedamp.coupling.engine.scenes import SLICE
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
     ACTIVE,
+    ASLEEP,
     CLOSED,
     CLOSED_ROWS,
     CLOSES,
@@ -78,6 +80,14 @@ from vanedamp.coupling.response.records import FRICTION
 @kernel
 def advance(system, flows, st, watched, rec, scratch, periods, max_events):
     """Run until all periods are done or something is needed. Return the code (numerics.codes) of why it returns."""
+    code = _go_on(system, flows, st, watched, rec, scratch, periods, max_events)
+    if st.counters[ASLEEP] > 0:
+        show_sleepers(system, flows, st)
+    return code
+
+
+@inlined
+def _go_on(system, flows, st, watched, rec, scratch, periods, max_events):
     deciding, segments = False, 0
     while True:
         if deciding:
@@ -101,7 +111,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
         if segments == SLICE or st.counters[LOGGED] + 2 * len(system.delassus) >= len(rec.log):
             return PAUSED
         segments += 1
-        tau, event, side = next_event(system, flows, st, watched)
+        tau, event, side = next_event(system, flows, st, watched, rec)
         if event == ENDLESS:
             return ILL_CONDITIONED
         amplitude_changes(flows, st, scratch, tau)
@@ -113,6 +123,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
         if event < 0:
             _end_period(system, flows, st, watched, rec, scratch, tau)
             continue
+        scratch.impulse[:] = 0.0
         st.counters[EVENTS] += 1
         st.time[0] += tau
         _set_phases(system, st)
@@ -136,6 +147,11 @@ def _begin_flow(system, flows, st, rec, scratch):
     Returns STATES_GO_ON, STATES_OPEN where they must be decided again, or NEEDS_FLOW.
     """
     s = _find_flow(flows, st.active_set)
+    if st.counters[ASLEEP] > 0:
+        if s == st.counters[FLOW]:
+            spend_on_friction(system, flows, st, scratch)
+        else:
+            wake_all(system, flows, st, rec, scratch)
     if s < 0:
         return NEEDS_FLOW
     flows.used[s] = st.counters[EVENTS]
@@ -157,6 +173,10 @@ def _forget_released(st):
 @inlined
 def _end_period(system, flows, st, watched, rec, scratch, tau):
     """Begin the next period after a segment of length tau, and record its start."""
+    if st.counters[ASLEEP] > 0:
+        st.time[0] += tau
+        scratch.impulse[:] = 0.0
+        wake_all(system, flows, st, rec, scratch)
     carry_over_period(system, st, watched, tau)
     account_spell(system, flows, st, rec, scratch)
     st.counters[PERIOD] += 1
@@ -271,7 +291,10 @@ def _set_constants(system, flows, st, scratch, s):
     loaded = False
     for i in range(n + b):
         loaded = loaded or scratch.loads[i] != 0.0
-    if loaded:
+    if loaded and flows.uncoupled[s]:
+        for i in range(n):
+            st.constant[i] += flows.static[s, i, i] * scratch.loads[i]
+    elif loaded:
         _add_product(flows.static[s], 0, scratch.loads, st.constant)
         if flows.sprung[s]:
             _add_product(flows.static[s], n, scratch.loads, st.slip_constant)
@@ -366,10 +389,11 @@ def _set_free_accelerations(system, st):
     n, b = system.modes, system.bodies
     for r in range(len(st.state)):
         st.free_acceleration[r], size = 0.0, 0.0
-        for i in range(n, n + b):
-            part = system.J[r, i] * st.coordinate_acceleration[i]
-            st.free_acceleration[r] += part
-            size += abs(part)
+        for body in (r if r < b else system.left_body[r], system.right_body[r]):
+            if body >= 0:
+                part = system.J[r, n + body] * st.coordinate_acceleration[n + body]
+                st.free_acceleration[r] += part
+                size += abs(part)
         if abs(st.free_acceleration[r]) <= CANCELLED * size:
             st.free_acceleration[r] = 0.0  # bodies that fall together
 
@@ -478,6 +502,8 @@ def _advance_motion(system, flows, st, rec, scratch, tau):
             r < friction and (state == STICK or state == HELD)
         ):
             continue
+        if r < system.bodies and st.asleep[r] != 0:
+            continue
         shift, speed = row_change(flows.motion[s, r], flows.velocity[s, r], scratch.bend, scratch.gain, count)
         shift += tau * (st.velocity[r] + 0.5 * st.free_acceleration[r] * tau)
         speed += st.free_acceleration[r] * tau
@@ -560,6 +586,8 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
             if not simultaneous_impacts(system, st, rec, scratch):
                 return NO_SOLUTION
             collided = True
+    if collided and st.counters[ASLEEP] > 0:
+        spend_on_impulses(system, flows, st, rec, scratch)
     if collided and all_in_flight(system, st):
         _change_amplitudes(system, flows, st, rec, scratch)
         return STATES_GO_ON

@@ -79,10 +79,10 @@ def stop_attached_bodies(system, flows, st):
     s, stopped = st.counters[FLOW], False
     for r in range(system.friction_rows):
         if (st.state[r] == SLIP_LEFT or st.state[r] == SLIP_RIGHT) and st.free_acceleration[r] == 0.0:
-            still = True
-            for j in range(flows.modes[s]):
-                still = still and flows.motion[s, r, j] == 0.0
-            if still:
+            j = ZERO
+            while j < flows.modes[s] and flows.motion[s, r, j] == 0.0:
+                j += 1
+            if j == flows.modes[s]:
                 st.velocity[r] = 0.0
                 stopped = True
     return stopped
@@ -121,7 +121,11 @@ def _list_candidate(st, scratch, r, moving, rests, k):
 @inlined
 def _decide(system, st, rec, scratch, k):
     """Solve for the k listed rows at rest: which are closed, stick, slip or open."""
-    friction, problem = system.friction_rows, scratch.problem
+    friction, problem, rigid_only = system.friction_rows, scratch.problem, True
+    for r in range(friction, len(st.state)):
+        rigid_only = rigid_only and rigid(system, r)
+    if k == 0 and rigid_only:
+        return True
     scale = _free_accelerations(system, st, scratch)
     for p in range(k):
         r = scratch.listed[p]

@@ -12,8 +12,9 @@ from vanedamp.coupling.engine.energy_forms import (
     points_of,
     turning_back,
 )
+from vanedamp.coupling.engine.line.sleeping import free_speed
 from vanedamp.coupling.engine.line.tolerances import SAMPLE
-from vanedamp.coupling.numerics.codes import ACTIVE, FLOW, HARMONIC_MAP, MEAN_MAP, MOMENTUM_MAP, PERIOD, WORK_MAP
+from vanedamp.coupling.numerics.codes import ACTIVE, ASLEEP, FLOW, HARMONIC_MAP, MEAN_MAP, MOMENTUM_MAP, PERIOD, WORK_MAP
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, VISCOUS
@@ -86,11 +87,12 @@ def _kicks(kick, amplitude, response, impulse, count):
 def _free_bodies(system, flows, st, rec, scratch, s, period, tau):
     """Add momentum and work of the polynomial part of the bodies' motion."""
     n, drift = system.modes, 0.0
-    speed = -free_momentum(flows.linear[s], st.amplitude, st.counters[ACTIVE])
+    asleep = st.counters[ASLEEP] > 0
+    speed = 0.0 if asleep else -free_momentum(flows.linear[s], st.amplitude, st.counters[ACTIVE])
     for b in range(system.bodies):
         drift += system.mass[n + b] * st.coordinate_acceleration[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
-            speed += system.mass[n + b] * st.velocity[b]
+            speed += system.mass[n + b] * (free_speed(flows, st, b) if asleep else st.velocity[b])
     for h in range(len(system.frequency)):
         rate = system.frequency[h]
         momentum = turning_back(speed, drift, rate, scratch.gain[h], scratch.bend[h], tau)
@@ -111,10 +113,7 @@ def _work_on_bodies(system, flows, st, scratch, s, h, tau):
         load = system.load[h, n + b].conjugate()
         drift += load * st.coordinate_acceleration[n + b]
         if flows.body_acceleration[s, b, b] != 0.0:
-            own = st.velocity[b]
-            for j in range(st.counters[ACTIVE]):
-                own -= (flows.velocity[s, b, j] * st.amplitude[j]).real
-            speed += load * own
+            speed += load * free_speed(flows, st, b)
     return turning_back(speed, drift, rate, scratch.gain[h], scratch.bend[h], tau).real
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.engine.line.sleeping import bounded_step, falls_asleep, first_to_wake, may_sleep, sleeps, wake
 from vanedamp.coupling.engine.line.tolerances import ADHESION, RECLOSING
 from vanedamp.coupling.engine.root_search import (
     ENDLESS,
     MOST,
     add_secular,
     expand,
-    first_root_of_parabola,
     step_or_stop,
 )
 from vanedamp.coupling.numerics.codes import (
@@ -48,7 +48,7 @@ _AHEAD = 0.02
 
 
 @inlined
-def next_event(system, flows, st, watched):
+def next_event(system, flows, st, watched, rec):
     """Return the time to the next event, its event function and its side, or to the period's end and -1.
 
     ENDLESS in place of -1 if it finds neither. Results beyond the period's end are kept for the next segment
@@ -58,10 +58,12 @@ def next_event(system, flows, st, watched):
     driven = _is_driven(flows, s)
     left = max(system.period - st.time[0], 0.0)
     shortest = RESOLUTION * system.period
-    count, taylor = _list_functions(system, flows, st, watched, s), watched.expansion.taylor
+    taylor, count, woken, listed = watched.expansion.taylor, ZERO, ZERO, False
     st.counters[SEGMENTS] += 1
     most = st.counters[EVALUATIONS] + MOST
     while True:
+        if not listed:
+            count, listed = _list_functions(system, flows, st, watched, rec, s, woken, count), True
         k, tau, longest = -1, left, system.period
         for i in range(count):
             first = watched.no_root_before[i]
@@ -69,6 +71,11 @@ def next_event(system, flows, st, watched):
                 k, tau = i, first
             if watched.status[i] == ROOT:
                 longest = min(longest, first)
+        body, first = first_to_wake(st)
+        if body >= 0 and first - st.time[0] <= tau:
+            woken, listed = st.asleep[body], False
+            wake(system, flows, st, rec, body)
+            continue
         if k < 0:
             st.counters[CARRIED] = count
             return left, -1, 0
@@ -124,23 +131,42 @@ def carry_over_period(system, st, watched, tau):
 
 
 @inlined
-def _list_functions(system, flows, st, watched, s):
-    """Set up the event functions of the segment. Return their number."""
-    count, r = ZERO, ZERO
-    for r in range(system.friction_rows):
+def _list_functions(system, flows, st, watched, rec, s, woken, count):
+    """Set up the event functions of the segment, or add those of the body that wakes. Return their number.
+
+    woken: the first contact of that body, 0 without one.
+    """
+    tired = woken == 0 and may_sleep(system, st, rec)
+    r, end, contact, last = ZERO, system.friction_rows, system.friction_rows, len(st.state)
+    if woken > 0:
+        r, contact, last = system.right_body[woken], woken, woken + 2
+        end = r + 1
+    while r < end:
         state = st.state[r]
+        if tired and r < system.bodies:
+            watched.stop[r] = -1
+            if st.asleep[r] != 0:
+                r += 1
+                continue
         if state == STICK or state == SPRUNG:
             count = _add_force_bounds(system, flows, st, watched, s, r, system.limit[r], True, count)
         elif state == SLIP_LEFT or state == SLIP_RIGHT:
+            if tired and r < system.bodies:
+                watched.stop[r] = count
             count = _add_motion(system, flows, st, watched, s, r, VELOCITY, float(state), STOPS, False, count)
-    r = system.friction_rows
-    while r < len(st.state):
+        r += 1
+    r = contact
+    while r < last:
         state = st.state[r]
-        if state == CLOSED or state == SPRUNG:
+        if tired and sleeps(system, st, r):
+            r += 1
+        elif state == CLOSED or state == SPRUNG:
             count = _add_force_bounds(system, flows, st, watched, s, r, 0.0, False, count)
         elif state == OPEN and not _surely_opens(system, st, r):
             both = _both_sides_open(system, st, r)
             count = _add_motion(system, flows, st, watched, s, r, POSITION, 1.0, CLOSES, both, count)
+            if tired and falls_asleep(system, flows, st, watched, r, count - 1):
+                count -= 1
             r += both
         elif state == LEAVING:
             count = _add_motion(system, flows, st, watched, s, r, POSITION, -1.0, OPENS, False, count)
@@ -197,15 +223,16 @@ def _add_motion(system, flows, st, watched, s, r, order, sign, meaning, both, k)
         bound += largest
     if meaning == CLOSES or meaning == OPENS:
         st.capture_speed[r] = max(0.0, -curvature) * 0.5 * CHATTER * system.period
+    watched.slope[k], watched.bound[k] = slope, bound
     sides = 1
     if both:
         sides, watched.k0[k, 1] = 2, st.displacement[r + 1]
         st.capture_speed[r + 1] = max(0.0, curvature) * 0.5 * CHATTER * system.period
     if _begin_function(st, watched, r, order, meaning, sides, k):
-        watched.no_root_before[k] = _bounded_step(value, slope, bound - watched.k2[k])
+        watched.no_root_before[k] = bounded_step(value, slope, bound - watched.k2[k])
         if both:
             watched.row[k, 1], watched.meaning[k, 1] = r + 1, CLOSES
-            other = _bounded_step(watched.k0[k, 1], -slope, bound + watched.k2[k])
+            other = bounded_step(watched.k0[k, 1], -slope, bound + watched.k2[k])
             watched.no_root_before[k] = min(watched.no_root_before[k], other)
     if _is_driven(flows, s):
         watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold
@@ -275,14 +302,6 @@ def _begin_function(st, watched, r, order, meaning, sides, k):
     watched.row[k, 0], watched.order[k], watched.meaning[k, 0], watched.sides[k] = r, order, meaning, sides
     watched.noise[k], watched.status[k], watched.no_root_before[k] = 0.0, BOUNDED, 0.0
     return True
-
-
-@inlined
-def _bounded_step(value, slope, bound):
-    """Return the time before which a function has no root whose second derivative is nowhere below -bound."""
-    if value > 0.0 or (value == 0.0 and slope > 0.0):
-        return first_root_of_parabola(value, slope, -bound)
-    return 0.0
 
 
 @kernel
@@ -394,10 +413,10 @@ def _add_force(system, flows, st, watched, s, r, side, sides, near, far, value, 
         near += ADHESION * system.spring[r] * system.play[r]
     watched.k0[k, 0], watched.k0[k, 1], watched.k1[k], watched.k2[k] = near, far, 0.0, 0.0
     if _begin_function(st, watched, r, FORCE, side, sides, k):
-        watched.no_root_before[k] = _bounded_step(near + value, slope, bound)
+        watched.no_root_before[k] = bounded_step(near + value, slope, bound)
         if sides == 2:
             watched.row[k, 1], watched.meaning[k, 1] = r, AT_HIGH
-            other = _bounded_step(far - value, -slope, bound)
+            other = bounded_step(far - value, -slope, bound)
             watched.no_root_before[k] = min(watched.no_root_before[k], other)
     if _is_driven(flows, s):
         watched.no_root_before[k] = min(watched.no_root_before[k], 2.0 * system.period)  # as far as the bounds hold

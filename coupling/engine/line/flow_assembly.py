@@ -453,3 +453,9 @@ def _set_energies(system, flows, s, m, forms):
             for j in range(e, m):
                 total += change[j].real * flows.linear[s, j, 2 * c] + change[j].imag * flows.linear[s, j, 2 * c + 1]
             flows.kick_maps[s, r, c] = total
+        moved, stirred = 0.0, 0.0
+        for j in range(e, m):
+            rate = abs(flows.eigenvalue[s, j])
+            moved += (rate * abs(flows.motion[s, r, j])) ** 2
+            stirred += (rate * abs(change[j])) ** 2
+        flows.stir[s, r, 0], flows.stir[s, r, 1] = math.sqrt(moved), math.sqrt(stirred)

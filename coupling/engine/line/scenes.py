@@ -96,7 +96,7 @@ def _set_start(system, st, watched, columns, k):
         st.coordinate_acceleration,
     ):  # fmt: skip
         part[:] = 0.0
-    st.counters[:], st.released[:], st.active_set[:], watched.status[:] = 0, 0, False, 0
+    st.counters[:], st.released[:], st.active_set[:], watched.status[:], st.asleep[:] = 0, 0, False, 0, 0
     st.last_impact[:] = -math.inf
     for j in range(len(st.amplitude)):
         st.amplitude[j] = 1.0 if j < e else 0.0

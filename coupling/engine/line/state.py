@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.engine.line.sleeping import SLEEP
 from vanedamp.coupling.engine.root_search import Expansion, new_expansion
 from vanedamp.coupling.numerics.codes import COUNTERS
 from vanedamp.coupling.numerics.compiler.record import record, room
@@ -35,6 +36,10 @@ class State(NamedTuple):
     velocity: Annotated[np.ndarray, "r"]  # of each row, m/s
     contact_impulse: Annotated[np.ndarray, "r"]  # impulse of a compliant contact since it began, N s
     ledger: Annotated[np.ndarray, "energies"]  # energies since the start, J
+
+    # bodies that sleep (line.sleeping)
+    asleep: Annotated[np.ndarray, "b", int]  # the first contact of one that sleeps, otherwise 0
+    sleepers: Annotated[np.ndarray, "b sleep"]
 
     # changes at impacts and at the start of a period
     largest_speed: Annotated[np.ndarray, "1"]  # bound of the structure's speeds, m/s: scale of their round-off
@@ -79,6 +84,9 @@ class EventFunctions(NamedTuple):
     noise: Annotated[np.ndarray, "k"]  # round-off of its value at the start, apart from k0's
     g: Annotated[np.ndarray, "k m", complex]  # amplitudes of its exponentials
     drive: Annotated[np.ndarray, "k m", complex]  # rates of growth of the driven modes
+    slope: Annotated[np.ndarray, "k"]  # its slope at the start
+    bound: Annotated[np.ndarray, "k"]  # of the second derivative of its exponentials
+    stop: Annotated[np.ndarray, "b", int]  # the function of each body's slip, -1: none
 
     # changes in the search
     status: Annotated[np.ndarray, "k", int]  # knowledge of its roots, BOUNDED, EXPANDED or ROOT
@@ -149,5 +157,5 @@ def _sizes(system: LineSystem, modes: int) -> dict[str, int]:
     r, n, b = len(system.delassus), system.modes, system.bodies
     return {
         "r": r, "k": 2 * r, "m": modes, "n": n, "b": b, "N": n + b, "counters": COUNTERS, "energies": len(ENERGIES),
-        "values": 1 + len(system.outputs),
+        "values": 1 + len(system.outputs), "sleep": SLEEP,
     }  # fmt: skip

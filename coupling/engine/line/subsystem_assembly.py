@@ -75,6 +75,8 @@ class Flows(NamedTuple):
     closed_inverse: Annotated[np.ndarray, "s r r"]  # inverse Delassus matrix of the rigid closed rows
     impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse on a row
 
+    stir: Annotated[np.ndarray, "s r 2"]  # of sleeping bodies (line.sleeping), where no rigid row is closed
+
     # sizes of modes, and steps of the search for the peak
     speed: Annotated[np.ndarray, "s m"]  # largest speed of a mode over all rows and the response
     acceleration: Annotated[np.ndarray, "s m"]  # largest of its terms, whether closed rows hold them or not

@@ -1,0 +1,224 @@
+"""Bodies that sleep: so far from any event that nothing elsewhere can bring them to one for a while.
+
+Each is alone in its cavity and slips or coasts. Until it wakes, its event functions keep half of their values, by the
+bounds of their second derivatives; what events elsewhere may change is spent from that half. An impulse P on row q
+moves row k by at most P (|W| t + a_k b_q t^2/2) within t: W, of Delassus's matrix, is the rate at the start, and
+a_k b_q bounds the second derivative, a sum over the modes (Cauchy and Schwarz; `stir` of Flows). So an event in a crowd
+costs as much as the bodies close to one of their own.
+"""
+
+from __future__ import annotations
+
+import math
+
+from vanedamp.coupling.engine.line.gap_kinematics import measure_gaps, shift_slip
+from vanedamp.coupling.engine.root_search import first_root_of_parabola
+from vanedamp.coupling.numerics.codes import ACTIVE, ASLEEP, CLOSED_ROWS, FLOW, PERIOD
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
+from vanedamp.coupling.response.records import FRICTION
+
+#: bodies from which on they sleep, and the shortest sleep, in periods over their number: otherwise it does not pay
+_CROWD, _DOZE = 6, 0.25
+
+#: of a sleeping body: when it wakes, and since when it sleeps, s in the period; its place, the lower word of that, and
+#: its speed then, and what the structure has of both; what is left of its margins, m and m/s
+UNTIL, SINCE, PLACE, LOW, SPEED, PART, RATE, MARGIN, SPEED_MARGIN = range(9)
+SLEEP = 9
+
+
+@inlined
+def may_sleep(system, st, rec):
+    """Whether bodies may sleep: no row is closed, and nobody asks for samples of their motion."""
+    return system.bodies >= _CROWD and st.counters[CLOSED_ROWS] == 0 and len(rec.samples) == 0
+
+
+@inlined
+def sleeps(system, st, r):
+    """Whether contact r is the first one of a body that sleeps."""
+    body = system.right_body[r]
+    return body >= 0 and st.asleep[body] == r
+
+
+@inlined
+def bounded_step(value, slope, bound):
+    """Return the time before which a function has no root whose second derivative is nowhere below -bound."""
+    if value > 0.0 or (value == 0.0 and slope > 0.0):
+        return first_root_of_parabola(value, slope, -bound)
+    return 0.0
+
+
+@inlined
+def falls_asleep(system, flows, st, watched, r, k):
+    """Let the body of contact r sleep, whose gap is event function k, if it is alone and it pays. Return whether."""
+    first = _first_contact(system, st, r)
+    if first < 0 or st.released[system.right_body[first]] != 0:
+        return False
+    b = system.right_body[first]
+    margin, speed_margin, stop = 0.5 * watched.k0[k, 0], math.inf, watched.stop[b]
+    time = bounded_step(margin, watched.k1[k], watched.bound[k] - watched.k2[k])
+    if watched.sides[k] == 2:
+        other = 0.5 * watched.k0[k, 1]
+        time = min(time, bounded_step(other, -watched.k1[k], watched.bound[k] + watched.k2[k]))
+        margin = min(margin, other)
+    if stop >= 0:
+        speed_margin = 0.5 * watched.k0[stop, 0]
+        time = min(time, bounded_step(speed_margin, watched.slope[stop], watched.bound[stop]))
+    if time * system.bodies < _DOZE * system.period:
+        return False
+    body = st.sleepers[b]
+    body[UNTIL], body[SINCE] = st.time[0] + time, st.time[0]
+    body[PLACE], body[LOW], body[SPEED] = st.displacement[b], st.low_word[b], st.velocity[b]
+    body[PART], body[RATE] = _of_structure(
+        flows.motion[st.counters[FLOW], b], flows.velocity[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE],
+        system.J[b], st.constant,
+    )  # fmt: skip
+    body[MARGIN], body[SPEED_MARGIN] = margin, speed_margin
+    st.asleep[b] = first
+    st.counters[ASLEEP] += 1
+    return True
+
+
+@inlined
+def _first_contact(system, st, r):
+    """Return the first contact of the body of contact r if it is alone, between walls that move with it; else -1."""
+    first = r if system.left_body[r] < 0 else r - 1
+    if first < system.friction_rows or first + 1 == len(st.state):
+        return -1
+    body = system.right_body[first]
+    if body < 0 or system.left_body[first] >= 0 or system.left_body[first + 1] != body:
+        return -1
+    walls = system.right_body[first + 1] < 0 and system.moves_with_floor[first] and system.moves_with_floor[first + 1]
+    return first if walls else -1
+
+
+@summing
+def _of_structure(motion, velocity, amplitude, count, functional, constant):
+    """Return what the structure has of a slip and of its rate."""
+    part, rate = 0.0, 0.0
+    for j in range(count):
+        part += motion[j].real * amplitude[j].real - motion[j].imag * amplitude[j].imag
+        rate += velocity[j].real * amplitude[j].real - velocity[j].imag * amplitude[j].imag
+    for i in range(len(constant)):
+        part += functional[i] * constant[i]
+    return part, rate
+
+
+@inlined
+def first_to_wake(st):
+    """Return the body that wakes first, and when, s in the period; -1 and inf if none sleeps."""
+    first, time = -1, math.inf
+    if st.counters[ASLEEP] > 0:
+        for b in range(len(st.asleep)):
+            if st.asleep[b] != 0 and st.sleepers[b, UNTIL] < time:
+                first, time = b, st.sleepers[b, UNTIL]
+    return first, time
+
+
+@inlined
+def free_speed(flows, st, b):
+    """Return the speed of a free body without what the structure has of it, m/s."""
+    if st.asleep[b] != 0:
+        body = st.sleepers[b]
+        return (body[SPEED] - body[RATE]) + st.free_acceleration[b] * (st.time[0] - body[SINCE])
+    return st.velocity[b] - _rate(flows.velocity[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE])
+
+
+@summing
+def _rate(velocity, amplitude, count):
+    total = 0.0
+    for j in range(count):
+        total += velocity[j].real * amplitude[j].real - velocity[j].imag * amplitude[j].imag
+    return total
+
+
+@kernel
+def _bring(system, flows, st, b):
+    """Bring a sleeping body to the present. Return how far it has slipped since it fell asleep, m."""
+    body, time = st.sleepers[b], st.time[0] - st.sleepers[b, SINCE]
+    part, rate = _of_structure(
+        flows.motion[st.counters[FLOW], b], flows.velocity[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE],
+        system.J[b], st.constant,
+    )  # fmt: skip
+    free, bend = body[SPEED] - body[RATE], st.free_acceleration[b]
+    shift = (part - body[PART]) + time * (free + 0.5 * bend * time)
+    st.displacement[b], st.low_word[b], st.velocity[b] = body[PLACE], body[LOW], (free + bend * time) + rate
+    shift_slip(st, b, shift)
+    return shift
+
+
+@kernel
+def wake(system, flows, st, rec, b):
+    """Let a body wake, with the friction of the time that it slept."""
+    shift = _bring(system, flows, st, b)
+    st.ledger[FRICTION] -= st.applied_force[b] * shift
+    if rec.worn.shape[1] > 0:
+        rec.worn[st.counters[PERIOD], b] += abs(st.applied_force[b] * shift)
+    st.asleep[b] = 0
+    st.counters[ASLEEP] -= 1
+    measure_gaps(system, st)
+
+
+@kernel
+def wake_all(system, flows, st, rec, scratch):
+    """Let all bodies wake. The impulses of an event (scratch.impulse) are not in the amplitudes yet."""
+    for b in range(system.bodies):
+        if st.asleep[b] != 0:
+            _wake_struck(system, flows, st, rec, scratch, b)
+
+
+@kernel
+def _wake_struck(system, flows, st, rec, scratch, b):
+    """Let a body wake with the impulses of an event, which are not in the amplitudes yet."""
+    wake(system, flows, st, rec, b)
+    for r in range(len(st.state)):
+        st.velocity[b] += system.delassus[b, r] * scratch.impulse[r]
+    measure_gaps(system, st)
+
+
+@kernel
+def show_sleepers(system, flows, st):
+    """Set displacements and velocities of sleeping bodies, for who looks at them; they go on sleeping."""
+    for b in range(system.bodies):
+        if st.asleep[b] != 0:
+            _bring(system, flows, st, b)
+    measure_gaps(system, st)
+
+
+@kernel
+def spend_on_impulses(system, flows, st, rec, scratch):
+    """Spend the margins of sleeping bodies on the impulses of an event, which are not in the amplitudes yet.
+
+    A body that has spent them wakes: the impulse may stop it.
+    """
+    for r in range(len(st.state)):
+        impulse = abs(scratch.impulse[r])
+        for b in range(system.bodies if impulse > 0.0 else 0):
+            if st.asleep[b] != 0:
+                body, once, again, time = _reached(system, flows, st, r, b)
+                body[SPEED_MARGIN] -= impulse * (once + again)
+                body[MARGIN] -= impulse * time * (once + 0.5 * again)
+    for b in range(system.bodies):
+        if st.asleep[b] != 0 and min(st.sleepers[b, MARGIN], st.sleepers[b, SPEED_MARGIN]) <= 0.0:
+            _wake_struck(system, flows, st, rec, scratch, b)
+
+
+@kernel
+def spend_on_friction(system, flows, st, scratch):
+    """Spend the margins of sleeping bodies on friction that has changed: one that has spent them wakes at once."""
+    for r in range(system.friction_rows):
+        force = 2.0 * system.limit[r] if scratch.old_state[r] != st.state[r] else 0.0
+        for b in range(system.bodies if force > 0.0 else 0):
+            if st.asleep[b] != 0:
+                body, once, again, time = _reached(system, flows, st, r, b)
+                body[SPEED_MARGIN] -= force * time * (once + 0.5 * again)
+                body[MARGIN] -= force * time * time * (0.5 * once + again * (1 / 6))
+                if min(body[MARGIN], body[SPEED_MARGIN]) <= 0.0:
+                    body[UNTIL] = st.time[0]
+
+
+@inlined
+def _reached(system, flows, st, r, b):
+    """Return a sleeping body, |W| and a_b b_r t of row r for it, and the time t for which it would still sleep, s."""
+    s, body = st.counters[FLOW], st.sleepers[b]
+    time = max(body[UNTIL] - st.time[0], 0.0)
+    return body, abs(system.delassus[b, r]), flows.stir[s, b, 0] * flows.stir[s, r, 1] * time, time
