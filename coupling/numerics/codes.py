@@ -51,7 +51,8 @@ STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
     NOT_STEADY, LONGER, OUTSIDE, UNCERTAIN, TRACED,
 ) = range(40, 54)  # fmt: skip
 
-# counters of a run, of any method; BEGUN: whether the present segment of bodies in the plane has begun; ASLEEP: bodies
+# counters of a run, of any method; BEGUN: whether the present segment of bodies in the plane,
+# or the present subsystem of sliders, has begun; ASLEEP: bodies
 (
     PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, ACTIVE, CARRIED, CLOSED_ROWS, STEPS,
     SOLVES, AT_ONCE, REDUCED, BEGUN, ASLEEP,

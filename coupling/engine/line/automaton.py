@@ -21,7 +21,7 @@ from vanedamp.coupling.engine.line.contact_states import (
     row_terms,
     stop_attached_bodies,
 )
-from vanedamp.coupling.engine.line.energy_balance import account, account_impact, account_spell
+from vanedamp.coupling.engine.line.energy_balance import account, account_impact, account_spell, account_step
 from vanedamp.coupling.engine.line.event_functions import ENDLESS, carry_over_period, hop_speed, next_event
 from vanedamp.coupling.engine.line.flow_assembly import code_of
 from vanedamp.coupling.engine.line.gap_kinematics import (
@@ -36,13 +36,14 @@ from vanedamp.coupling.engine.line.gap_kinematics import (
 )
 from vanedamp.coupling.engine.line.impacts import all_in_flight, simultaneous_impacts, single_impact
 from vanedamp.coupling.engine.line.recording import record_start, structure_state
-from vanedamp.coupling.engine.line.sleeping import show_sleepers, spend_on_friction, spend_on_impulses, wake_all
+from vanedamp.coupling.engine.line.sleeping import may_sleep, show_sleepers, spend_on_friction, spend_on_impulses, wake_all
 from vanedamp.coupling.engine.line.tolerances import INACTIVE, OVERLAP
 from vanedamp.coupling.engine.scenes import SLICE
 from vanedamp.coupling.numerics.codes import (
     ACCURACY_LOST,
     ACTIVE,
     ASLEEP,
+    BEGUN,
     CLOSED,
     CLOSED_ROWS,
     CLOSES,
@@ -134,9 +135,7 @@ def _go_on(system, flows, st, watched, rec, scratch, periods, max_events):
         if outcome == NO_SOLUTION:
             return UNDECIDED
         deciding = outcome == STATES_OPEN
-        if deciding:
-            account_spell(system, flows, st, rec, scratch)
-        elif not _within_walls(system, st):
+        if not deciding and not _within_walls(system, st):
             return ACCURACY_LOST
 
 
@@ -152,8 +151,16 @@ def _begin_flow(system, flows, st, rec, scratch):
             spend_on_friction(system, flows, st, scratch)
         else:
             wake_all(system, flows, st, rec, scratch)
+    if st.counters[BEGUN] == 1 and s == st.counters[FLOW] and _only_friction(system, st, rec):
+        _change_amplitudes(system, flows, st, rec, scratch)
+        _change_friction(system, flows, st, rec)
+        st.counters[SEARCHING] = 0
+        return STATES_GO_ON
+    account_spell(system, flows, st, rec, scratch)
+    st.counters[BEGUN] = 0
     if s < 0:
         return NEEDS_FLOW
+    st.counters[BEGUN] = 1
     flows.used[s] = st.counters[EVENTS]
     _begin_subsystem(system, flows, st, scratch, s)
     if stop_attached_bodies(system, flows, st):
@@ -162,6 +169,44 @@ def _begin_flow(system, flows, st, rec, scratch):
     if st.counters[EVENTS] == 0 and st.counters[PERIOD] == 0:
         record_start(system, flows, st, rec, scratch)
     return STATES_GO_ON
+
+
+@inlined
+def _only_friction(system, st, rec):
+    """Whether nothing changes in a crowd in flight but friction, and speeds by impulses."""
+    only = may_sleep(system, st, rec)
+    for r in range(system.bodies, len(st.state)):
+        only = only and st.applied_force[r] == st.included_force[r]
+    return only
+
+
+@kernel
+def _change_friction(system, flows, st, rec):
+    """Change the friction on bodies within the same subsystem."""
+    s, n = st.counters[FLOW], system.modes
+    for r in range(system.bodies):
+        force = st.applied_force[r] - st.included_force[r]
+        if force == 0.0:
+            continue
+        shift, column = 0.0, system.J[r]
+        for i in range(n):
+            part = flows.static[s, i, i] * column[i]
+            if not flows.uncoupled[s]:
+                part = 0.0
+                for k in range(n):
+                    part += flows.static[s, i, k] * column[k]
+            st.constant[i] += force * part
+            shift += system.response[i] * (force * part)
+            for k in range(len(system.outputs)):
+                st.offset[1 + k] += system.outputs[k, i] * (force * part)
+        account_step(system, flows, st, rec, r, force, shift)
+        _add_gains(flows.step_response[s, r], force, flows.driven[s, 0], flows.modes[s], st.amplitude, st.change)
+        st.coordinate_acceleration[n + r] = flows.body_acceleration[s, r, r] * (
+            system.weight[n + r] + st.applied_force[r] * column[n + r]
+        )
+        st.included_force[r] = st.applied_force[r]
+    _set_free_accelerations(system, st)
+    _activate_modes(flows, st)
 
 
 @inlined
@@ -262,6 +307,8 @@ def _set_phases(system, st):
 def _begin_subsystem(system, flows, st, scratch, s):
     """Begin subsystem s with the structure at st.coordinates and the row states as they are."""
     st.counters[FLOW], st.counters[SEARCHING] = s, 0
+    for r in range(len(st.state)):
+        st.included_force[r] = st.applied_force[r]
     _set_constants(system, flows, st, scratch, s)
     _set_amplitudes(system, flows, st, scratch, s)
     _set_free_accelerations(system, st)

@@ -54,9 +54,31 @@ def account_spell(system, flows, st, rec, scratch):
 @inlined
 def account_impact(system, flows, st, rec, r, impulse):
     """Take the jump of all forms at an impulse on row r (N s) out of the spell, before the amplitudes jump."""
-    s, period, e = st.counters[FLOW], st.counters[PERIOD], len(system.frequency)
-    kick, maps, back = flows.kick[s, r], flows.kick_maps[s, r], st.amplitude[0].conjugate()
-    loss, square, contact = _kicks(kick, st.amplitude, flows.impulse_response[s, r], impulse, flows.modes[s])
+    s = st.counters[FLOW]
+    _account_jump(
+        system, flows, st, rec, flows.kick[s, r], flows.kick_maps[s, r], flows.impulse_response[s, r], impulse
+    )
+
+
+@inlined
+def account_step(system, flows, st, rec, r, force, shift):
+    """Do the same at a step of the friction on body r (N), which shifts the response by its constant part (m)."""
+    s, period, mean = st.counters[FLOW], st.counters[PERIOD], 0.0
+    for j in range(st.counters[ACTIVE]):
+        mean += flows.linear[s, j, MEAN_MAP] * st.change[2 * j] + flows.linear[s, j, MEAN_MAP + 1] * st.change[2 * j + 1]
+    rec.square[period] -= shift * mean
+    rec.harmonic[period] -= shift * (complex(0.0, 1.0 / system.omega) * complex(st.change[0], -st.change[1]))
+    st.offset[0] += shift
+    _account_jump(
+        system, flows, st, rec, flows.step[s, r], flows.step_maps[s, r], flows.step_response[s, r], force
+    )
+
+
+@kernel
+def _account_jump(system, flows, st, rec, kick, maps, response, impulse):
+    """Take the jump of all forms out of the spell as the amplitudes jump by a response times an impulse."""
+    s, period, e, back = st.counters[FLOW], st.counters[PERIOD], len(system.frequency), st.amplitude[0].conjugate()
+    loss, square, contact = _kicks(kick, st.amplitude, response, impulse, flows.modes[s])
     st.ledger[VISCOUS] -= impulse * loss
     st.ledger[CONTACT] -= impulse * contact
     rec.square[period] -= impulse * (square + st.offset[0] * maps[MEAN_MAP // 2])

@@ -415,6 +415,10 @@ def _set_energies(system, flows, s, m, forms):
     jumps = True
     for r in range(rows):
         jumps = jumps and not (flows.active_set[s, r] and system.spring[r] == math.inf)
+    crowd = flows.step.shape[1] if jumps else 0
+    for r in range(crowd):
+        for j in range(e, m):
+            flows.step_response[s, r, j] = flows.impulse_response[s, r, j] * forms.inverse_rate[j]
     for j in range(m):
         forms.free[j] = 0.0
         for i in range(system.bodies):
@@ -445,17 +449,25 @@ def _set_energies(system, flows, s, m, forms):
             form[: 2 * m, : 2 * m], slow[:pairs] = 0.0, 0.0
         for r in range(rows if jumps else 0):
             kick(flows.impulse_response[s, r, :m], form, flows.kick[s, r, what])
+        for r in range(crowd):
+            kick(flows.step_response[s, r, :m], form, flows.step[s, r, what])
     flows.slow_count[s] = list_single(flows, s, m, system.period, pairs)
     for r in range(rows if jumps else 0):
-        change = flows.impulse_response[s, r]
-        for c in range(flows.kick_maps.shape[2]):
-            total = 0.0
-            for j in range(e, m):
-                total += change[j].real * flows.linear[s, j, 2 * c] + change[j].imag * flows.linear[s, j, 2 * c + 1]
-            flows.kick_maps[s, r, c] = total
+        _set_maps(flows, s, e, m, flows.impulse_response[s, r], flows.kick_maps[s, r])
         moved, stirred = 0.0, 0.0
         for j in range(e, m):
             rate = abs(flows.eigenvalue[s, j])
             moved += (rate * abs(flows.motion[s, r, j])) ** 2
-            stirred += (rate * abs(change[j])) ** 2
+            stirred += (rate * abs(flows.impulse_response[s, r, j])) ** 2
         flows.stir[s, r, 0], flows.stir[s, r, 1] = math.sqrt(moved), math.sqrt(stirred)
+    for r in range(crowd):
+        _set_maps(flows, s, e, m, flows.step_response[s, r], flows.step_maps[s, r])
+
+
+@kernel
+def _set_maps(flows, s, e, m, change, maps):
+    """Set the linear maps of a change of the amplitudes of the modes from e to m."""
+    for c in range(len(maps)):
+        maps[c] = 0.0
+        for j in range(e, m):
+            maps[c] += change[j].real * flows.linear[s, j, 2 * c] + change[j].imag * flows.linear[s, j, 2 * c + 1]

@@ -18,7 +18,7 @@ from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.response.records import FRICTION
 
 #: bodies from which on they sleep, and the shortest sleep, in periods over their number: otherwise it does not pay
-_CROWD, _DOZE = 6, 0.25
+CROWD, _DOZE = 6, 0.25
 
 #: of a sleeping body: when it wakes, and since when it sleeps, s in the period; its place, the lower word of that, and
 #: its speed then, and what the structure has of both; what is left of its margins, m and m/s
@@ -27,9 +27,15 @@ SLEEP = 9
 
 
 @inlined
+def is_crowd(system):
+    """Whether there are so many bodies that they sleep."""
+    return system.bodies >= CROWD
+
+
+@inlined
 def may_sleep(system, st, rec):
     """Whether bodies may sleep: no row is closed, and nobody asks for samples of their motion."""
-    return system.bodies >= _CROWD and st.counters[CLOSED_ROWS] == 0 and len(rec.samples) == 0
+    return is_crowd(system) and st.counters[CLOSED_ROWS] == 0 and len(rec.samples) == 0
 
 
 @inlined

@@ -52,6 +52,7 @@ class State(NamedTuple):
     # carry load at that bound
     released: Annotated[np.ndarray, "r", int]
     applied_force: Annotated[np.ndarray, "r"]  # constant force of rows that are not closed, N
+    included_force: Annotated[np.ndarray, "r"]  # the one that the constant parts include, N
     capture_speed: Annotated[np.ndarray, "r"]  # rebounds slower than this are completed as a plastic impact, m/s
 
     # set when a subsystem begins

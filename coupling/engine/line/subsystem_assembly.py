@@ -19,6 +19,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.engine.known import ROOM, places
+from vanedamp.coupling.engine.line.sleeping import CROWD
 from vanedamp.coupling.engine.line.subsystems import most_modes
 from vanedamp.coupling.engine.line.tolerances import MANY
 from vanedamp.coupling.engine.peaks import GRIDS
@@ -92,6 +93,10 @@ class Flows(NamedTuple):
     # loss, square, dashpot of a mode and the change by a unit impulse on a row, where no rigid one is closed
     kick: Annotated[np.ndarray, "s r 3 2m"]
     kick_maps: Annotated[np.ndarray, "s r kicks"]  # linear maps of that change
+    # the same of a unit step of the friction on a body, in crowds (line.sleeping): change of c, forms, linear maps
+    step_response: Annotated[np.ndarray, "s c m", complex]
+    step: Annotated[np.ndarray, "s c 3 2m"]
+    step_maps: Annotated[np.ndarray, "s c kicks"]
     damped: Annotated[np.ndarray, "s", bool]  # whether contacts with dashpots are closed
     uncoupled: Annotated[np.ndarray, "s", bool]  # whether damping couples no two free modes
     coalescing: Annotated[np.ndarray, "s", bool]  # whether modes nearly coalesce: their quadratic forms are zero
@@ -115,5 +120,5 @@ def empty_flows(system: LineSystem, capacity: int | None = None) -> Flows:
     s, n, b, r, e = capacity, system.modes, system.bodies, len(system.delassus), len(system.frequency)
     m = most_modes(system) + e
     sizes = {"s": s, "n": n, "b": b, "N": n + b, "r": r, "e": e, "m": m, "pairs": m * (m + 3), "grids": GRIDS}
-    sizes["k"] = len(system.outputs)
+    sizes["k"], sizes["c"] = len(system.outputs), b if b >= CROWD else 0
     return room(Flows, sizes | {"phases": e + 1, "maps": WORK_MAP + 4 * e, "kicks": WORK_MAP // 2 + 2 * e})
