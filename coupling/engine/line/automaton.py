@@ -36,7 +36,13 @@ from vanedamp.coupling.engine.line.gap_kinematics import (
 )
 from vanedamp.coupling.engine.line.impacts import all_in_flight, simultaneous_impacts, single_impact
 from vanedamp.coupling.engine.line.recording import record_start, structure_state
-from vanedamp.coupling.engine.line.sleeping import may_sleep, show_sleepers, spend_on_friction, spend_on_impulses, wake_all
+from vanedamp.coupling.engine.line.sleeping import (
+    may_sleep,
+    show_sleepers,
+    spend_on_friction,
+    spend_on_impulses,
+    wake_all,
+)
 from vanedamp.coupling.engine.line.tolerances import INACTIVE, OVERLAP
 from vanedamp.coupling.engine.scenes import SLICE
 from vanedamp.coupling.numerics.codes import (
@@ -151,7 +157,7 @@ def _begin_flow(system, flows, st, rec, scratch):
             spend_on_friction(system, flows, st, scratch)
         else:
             wake_all(system, flows, st, rec, scratch)
-    if st.counters[BEGUN] == 1 and s == st.counters[FLOW] and _only_friction(system, st, rec):
+    if st.counters[BEGUN] == 1 and s == st.counters[FLOW] and _only_friction(system, st):
         _change_amplitudes(system, flows, st, rec, scratch)
         _change_friction(system, flows, st, rec)
         st.counters[SEARCHING] = 0
@@ -172,9 +178,9 @@ def _begin_flow(system, flows, st, rec, scratch):
 
 
 @inlined
-def _only_friction(system, st, rec):
+def _only_friction(system, st):
     """Whether nothing changes in a crowd in flight but friction, and speeds by impulses."""
-    only = may_sleep(system, st, rec)
+    only = may_sleep(system, st)
     for r in range(system.bodies, len(st.state)):
         only = only and st.applied_force[r] == st.included_force[r]
     return only

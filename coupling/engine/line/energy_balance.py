@@ -12,9 +12,18 @@ from vanedamp.coupling.engine.energy_forms import (
     points_of,
     turning_back,
 )
-from vanedamp.coupling.engine.line.sleeping import free_speed
+from vanedamp.coupling.engine.line.sleeping import free_speed, show_sleepers
 from vanedamp.coupling.engine.line.tolerances import SAMPLE
-from vanedamp.coupling.numerics.codes import ACTIVE, ASLEEP, FLOW, HARMONIC_MAP, MEAN_MAP, MOMENTUM_MAP, PERIOD, WORK_MAP
+from vanedamp.coupling.numerics.codes import (
+    ACTIVE,
+    ASLEEP,
+    FLOW,
+    HARMONIC_MAP,
+    MEAN_MAP,
+    MOMENTUM_MAP,
+    PERIOD,
+    WORK_MAP,
+)
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.numerics.exponentials import exp_minus_line, exp_minus_one, secular
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, VISCOUS
@@ -30,6 +39,8 @@ def account(system, flows, st, rec, scratch, tau):
     if flows.coalescing[s]:
         _add_losses(system, flows, st, rec, scratch, s, tau)
     if rec.samples.shape[0] > 0:
+        if st.counters[ASLEEP] > 0:
+            show_sleepers(system, flows, st)
         _sample(system, flows, st, rec, s, tau, constant)
 
 
@@ -65,13 +76,13 @@ def account_step(system, flows, st, rec, r, force, shift):
     """Do the same at a step of the friction on body r (N), which shifts the response by its constant part (m)."""
     s, period, mean = st.counters[FLOW], st.counters[PERIOD], 0.0
     for j in range(st.counters[ACTIVE]):
-        mean += flows.linear[s, j, MEAN_MAP] * st.change[2 * j] + flows.linear[s, j, MEAN_MAP + 1] * st.change[2 * j + 1]
+        mean += (
+            flows.linear[s, j, MEAN_MAP] * st.change[2 * j] + flows.linear[s, j, MEAN_MAP + 1] * st.change[2 * j + 1]
+        )
     rec.square[period] -= shift * mean
     rec.harmonic[period] -= shift * (complex(0.0, 1.0 / system.omega) * complex(st.change[0], -st.change[1]))
     st.offset[0] += shift
-    _account_jump(
-        system, flows, st, rec, flows.step[s, r], flows.step_maps[s, r], flows.step_response[s, r], force
-    )
+    _account_jump(system, flows, st, rec, flows.step[s, r], flows.step_maps[s, r], flows.step_response[s, r], force)
 
 
 @kernel

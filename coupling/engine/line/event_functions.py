@@ -63,7 +63,7 @@ def next_event(system, flows, st, watched, rec):
     most = st.counters[EVALUATIONS] + MOST
     while True:
         if not listed:
-            count, listed = _list_functions(system, flows, st, watched, rec, s, woken, count), True
+            count, listed = _list_functions(system, flows, st, watched, s, woken, count), True
         k, tau, longest = -1, left, system.period
         for i in range(count):
             first = watched.no_root_before[i]
@@ -131,12 +131,12 @@ def carry_over_period(system, st, watched, tau):
 
 
 @inlined
-def _list_functions(system, flows, st, watched, rec, s, woken, count):
+def _list_functions(system, flows, st, watched, s, woken, count):
     """Set up the event functions of the segment, or add those of the body that wakes. Return their number.
 
     woken: the first contact of that body, 0 without one.
     """
-    tired = woken == 0 and may_sleep(system, st, rec)
+    tired = woken == 0 and may_sleep(system, st)
     r, end, contact, last = ZERO, system.friction_rows, system.friction_rows, len(st.state)
     if woken > 0:
         r, contact, last = system.right_body[woken], woken, woken + 2

@@ -27,15 +27,9 @@ SLEEP = 9
 
 
 @inlined
-def is_crowd(system):
-    """Whether there are so many bodies that they sleep."""
-    return system.bodies >= CROWD
-
-
-@inlined
-def may_sleep(system, st, rec):
-    """Whether bodies may sleep: no row is closed, and nobody asks for samples of their motion."""
-    return is_crowd(system) and st.counters[CLOSED_ROWS] == 0 and len(rec.samples) == 0
+def may_sleep(system, st):
+    """Whether bodies may sleep: there are many, and no row is closed."""
+    return system.bodies >= CROWD and st.counters[CLOSED_ROWS] == 0
 
 
 @inlined

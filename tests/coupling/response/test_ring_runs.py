@@ -76,6 +76,22 @@ def test_six_bodies_follow_an_independent_integrator(file, tmp_path):
     assert ring.event_list == found.event_list
 
 
+@pytest.mark.parametrize(
+    ("sectors", "mass", "friction", "wave"), [(8, 0.3, 0.0, 3), (7, 0.1, 0.6, 1), (8, 0.01, 0.1, 2)]
+)
+def test_sleeping_bodies_follow_an_independent_integrator(sectors, mass, friction, wave, tmp_path):
+    """Heavy bodies wake each other by their impacts, without friction as well; light ones sleep for long."""
+    chain = Chain(sectors=sectors, damping_ratio=0.01)
+    frequency = 1.01 * float(np.sqrt(chain.squares([wave])[0]) / (2 * np.pi))
+    made = scene(chain.saved(tmp_path), excitation={"frequency": frequency, "force": 25.0, "at": "tip", "wave": wave})
+    made = made.replace({"damper.0.mass": mass, "damper.0.friction": friction, "cavity.c.gap": 5e-5})
+    model = chain.ring().model(None)
+    model.save(tmp_path / "rom.h5")
+    data = unrolled(made).to_dict() | {"structure": {"model": "rom", "file": str(tmp_path / "rom.h5")}}
+    found = follow(validate(Scene, data, "scene"), 6, model, tmp_path)
+    assert found.counters["impacts"] > 30
+
+
 def test_time_steps_converge_to_the_events(file):
     made = scene(file, excitation={"frequency": RESONANCE, "force": 25.0, "at": "tip", "wave": 2})
     made = made.replace({"time": {"periods": 6, "transient": 0}})
