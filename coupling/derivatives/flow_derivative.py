@@ -44,6 +44,9 @@ class FlowDerivative:
         oblique = s.oblique @ of_wrench @ s.carried - held @ s.inverse @ of_rows @ s.oblique
         moved = oblique @ flow.free + s.oblique @ free
         carried = s.carried @ (free + of_wrench @ flow.carried - moved)
+        if s.undetermined.size:  # they may move what the rows leave free
+            more = self._least(carried, of_rows, of_rows @ s.wrench + s.rows[s.kept] @ of_wrench)
+            carried, moved = carried + more, moved + s.wrench @ more
         self.forces[:, s.kept] += carried
         self.forces[:, u + m] -= turned[:, m] * flow.carried[: len(m)] + drag[m] * carried[:, : len(m)]
         self.X = of.turn.copy()
@@ -51,6 +54,19 @@ class FlowDerivative:
         slips = flow.state[dynamics.jenkins] != codes.STICK
         follows = of.follows[:, slips, rates]
         self.X[:, rates][:, dynamics.sliders[slips]] += follows @ (s.oblique @ flow.free)
+
+    def _least(self, carried: np.ndarray, of_rows: np.ndarray, mobility: np.ndarray) -> np.ndarray:
+        """Return what derivatives of the kept rows' forces (P, k, K) lack for these to stay the least.
+
+        The least are normal to those that are open, in units of the rows' lengths, and numbers turn both.
+        of_rows (P, k, N), mobility (P, k, k): derivatives of the rows, and of what forces do to them.
+        """
+        s, forces = self.flow.solved, self.flow.carried
+        rows, free = s.rows[s.kept], s.undetermined
+        square, stretch = (rows * rows).sum(axis=1), 2.0 * (of_rows * rows).sum(axis=2)
+        moved = s.carried @ s.inverse @ mobility @ free
+        turned = free.T * stretch[:, None] + moved.swapaxes(1, 2) * square
+        return np.asarray(-free @ ((free.T * square) @ carried + turned @ forces))
 
     def _pushes(self, n: np.ndarray) -> np.ndarray:
         """Return the derivatives (P, m, K) of the pressures of springs and dashpots of contacts (m,)."""

@@ -116,6 +116,15 @@ class StateFlow:
         return np.asarray(np.linalg.pinv(self.rows[self.kept], rcond=SINGULAR))
 
     @cached_property
+    def undetermined(self) -> np.ndarray:
+        """Forces (k, n) that the kept rows do not feel: laws leave them open. Normal in units of the rows' lengths."""
+        rows = self.rows[self.kept]
+        scale = 1 / np.linalg.norm(rows, axis=1)
+        # on the rows' span: the mobility of rows that nearly depend on each other has the square of their condition
+        felt = self.inverse @ rows @ self.wrench * scale
+        return scale[:, None] * null_space(felt, rcond=SINGULAR) if len(rows) else np.zeros((0, 0))
+
+    @cached_property
     def held(self) -> np.ndarray:
         """Whether constraints hold the slip of a unit (u,), which may count as slipping."""
         slips = self.drawn[self.u :]
