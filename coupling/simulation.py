@@ -54,15 +54,19 @@ def simulate(
 
 def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0) -> list[Observer]:
     """Return what a run keeps of a scene without open choices; arguments as in `simulate`."""
-    spots = spots_of(scene)
     return [
         WALLS,
         samples(samples_per_period),
         *([EVENT_LIST] if events else []),
-        *parts_of(scene),
-        *([] if spots is None else [StressObserver(spots, samples_per_period)]),
+        *parts_of_run(scene, samples_per_period),
         TOGETHER,
     ]
+
+
+def parts_of_run(scene: Scene, samples_per_period: int = 0) -> list[Observer]:
+    """Return what keeps the parts that quantities of a run need; samples_per_period: that others keep."""
+    spots = spots_of(scene)
+    return [*parts_of(scene), *([] if spots is None else [StressObserver(spots, samples_per_period)])]
 
 
 def parts_of(scene: Scene) -> list[Observer]:

@@ -25,9 +25,9 @@ from vanedamp.coupling.numerics.codes import (
     WORK_MAP,
 )
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
-from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular
-from vanedamp.coupling.numerics.tolerances import LAST_TERM, SLOW
-from vanedamp.coupling.response.records import CONTACT, EXCITATION, VISCOUS
+from vanedamp.coupling.numerics.exponentials import exp_minus_one, secular, secular_bound
+from vanedamp.coupling.numerics.tolerances import LAST_TERM, PIECE, SLOW
+from vanedamp.coupling.response.records import CONTACT, EXCITATION, MOST_PIECES, VISCOUS
 
 #: Gauss's rule on [-1, 1]: its error for a product of modes over a time 1/rate is below 1e-17
 _NODES, _WEIGHTS = (tuple(part.tolist()) for part in np.polynomial.legendre.leggauss(8))
@@ -58,8 +58,11 @@ def add_segment(system, flows, st, rec, scratch, s, period, tau, constant, grows
     else:
         top = rec.peak[period]
         rec.peak[period] = highest(system, flows, st, scratch, s, response, tau, constant, grows, top, 0.0)
-    if rec.outputs.shape[1] > 0 and period >= rec.counted[0]:
-        _add_outputs(system, flows, st, rec, scratch, s, period, tau, grows)
+    if period >= rec.counted[0]:
+        if rec.outputs.shape[1] > 0:
+            _add_outputs(system, flows, st, rec, scratch, s, period, tau, grows)
+        if rec.course.shape[0] > 0 and tau > 0.0:
+            _note_course(system, flows, st, rec, scratch, s, period, tau, grows)
 
 
 @kernel
@@ -89,6 +92,58 @@ def _add_outputs(system, flows, st, rec, scratch, s, period, tau, grows):
             found[2] += constant * tau + _real_part(row, scratch.total, count)
         else:
             found[0] = _highest(system, flows, st, scratch, s, row, tau, constant, grows, found[0], 0.0)
+
+
+@kernel
+def _note_course(system, flows, st, rec, scratch, s, period, tau, grows):
+    """Write down the further outputs and their derivatives at the ends of pieces of the segment.
+
+    A polynomial of degree 7 that has them at both ends of a piece of length h differs by at most (bound of the eighth
+    derivative) h^8/(2^8 8!): the pieces keep this below PIECE of the outputs' size.
+    """
+    outputs, value, count, size, eighth = flows.outputs[s], scratch.wave, st.counters[ACTIVE], 0.0, 0.0
+    for j in range(count):
+        rate, c, reach = flows.eigenvalue[s, j], st.amplitude[j], 0.0
+        for k in range(len(outputs)):
+            reach += abs(outputs[k, j].real) + abs(outputs[k, j].imag)
+        part, square = reach * (abs(c.real) + abs(c.imag)), rate.real * rate.real + rate.imag * rate.imag
+        size += part
+        eighth += part * square * square * square * square
+        for h in range(flows.driven.shape[1] - 1):
+            if flows.driven[s, h] <= j < flows.driven[s, h + 1]:
+                drive = reach * flows.load[s, j] * st.amplitude[h]
+                eighth += secular_bound(drive, rate, flows.eigenvalue[s, h], system.period, 8)
+    most = 1 + int(tau / system.period * MOST_PIECES)
+    wanted = tau * (grows * eighth / (PIECE * 10321920.0 * size)) ** 0.125 if size > 0.0 else 1.0
+    pieces = max(math.ceil(wanted), 1) if wanted < most else most
+    for i in range(pieces + 1):
+        if i == 0 or i == pieces:
+            for j in range(count):
+                value[j] = st.amplitude[j] + (scratch.gain[j] if i > 0 else 0.0)
+        else:
+            _amplitudes_at(flows, st, s, i * tau / pieces, value, count)
+        _note_outputs(flows, st, rec, s, value, count, period, tau / pieces if i < pieces else 0.0)
+
+
+@kernel
+def _note_outputs(flows, st, rec, s, value, count, period, ahead):
+    """Write a row of the course, of amplitudes which are lost, and the time to the next row of the segment."""
+    row, outputs = rec.course[rec.noted[0]], flows.outputs[s]
+    rec.noted[0] += 1
+    row[0], row[1] = period, ahead
+    for d in range(4):
+        part = row[2 + d * len(outputs) :]
+        for k in range(len(outputs)):
+            total = st.offset[1 + k] if d == 0 else 0.0
+            for j in range(count):
+                total += outputs[k, j].real * value[j].real - outputs[k, j].imag * value[j].imag
+            part[k] = total
+        for h in range(flows.driven.shape[1] - 1):  # c' = rate c + load phase
+            for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
+                value[j] = flows.eigenvalue[s, j] * value[j] + flows.load[s, j] * value[h]
+        for j in range(count):
+            if not flows.driven[s, 0] <= j < flows.driven[s, flows.driven.shape[1] - 1]:
+                value[j] *= flows.eigenvalue[s, j]
 
 
 @kernel
@@ -347,12 +402,7 @@ def at_point(system, flows, st, rec, scratch, s, tau, i, points):
     rule, count, value, x, calm = len(_NODES), st.counters[ACTIVE], scratch.wave, 0.0, 0.0
     width = tau * rule / points
     t, weight = (i // rule + 0.5 + 0.5 * _NODES[i % rule]) * width, 0.5 * width * _WEIGHTS[i % rule]
-    for j in range(count):
-        value[j] = st.amplitude[j] * (1.0 + exp_minus_one(flows.eigenvalue[s, j] * t))
-    for h in range(flows.driven.shape[1] - 1):
-        for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
-            growth, _ = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, h], t)
-            value[j] += flows.load[s, j] * st.amplitude[h] * growth
+    _amplitudes_at(flows, st, s, t, value, count)
     for j in range(count):
         part = (flows.response[s, j] * value[j]).real
         x += part
@@ -360,3 +410,14 @@ def at_point(system, flows, st, rec, scratch, s, tau, i, points):
         calm += part if 2.0 * abs(flows.eigenvalue[s, j]) * system.period < SLOW else 0.0
     rec.square[st.counters[PERIOD]] += weight * (x * x - calm * calm)
     return weight
+
+
+@kernel
+def _amplitudes_at(flows, st, s, t, value, count):
+    """Set the amplitudes at a time t of the segment."""
+    for j in range(count):
+        value[j] = st.amplitude[j] * (1.0 + exp_minus_one(flows.eigenvalue[s, j] * t))
+    for h in range(flows.driven.shape[1] - 1):
+        for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
+            growth, _ = secular(flows.eigenvalue[s, j], flows.eigenvalue[s, h], t)
+            value[j] += flows.load[s, j] * st.amplitude[h] * growth

@@ -11,7 +11,7 @@ import numpy as np
 
 from vanedamp.coupling.engine.columns import STARTS, Columns, repeated
 from vanedamp.coupling.engine.known import IllConditioned, Known, with_place
-from vanedamp.coupling.engine.scenes import CODE, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job
+from vanedamp.coupling.engine.scenes import CODE, COURSE_ROOM, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job
 from vanedamp.coupling.engine.trace import COURSE, UNTRACED, Trace, clear, new_trace, turned
 from vanedamp.coupling.numerics.codes import (
     DONE,
@@ -44,7 +44,8 @@ class EventDrivenRun(ABC):
     """The mutable state of one run of an engine, and the flows of the subsystems that it has met.
 
     whole: the scene's system; system: its rows as the engine has them; events: whether to keep the log; max_events:
-    after which a run ends. columns: what differs between scenes of a job (engine.columns), or the start of one run.
+    after which a run ends; reader: takes rows of the course, and returns how many. columns: what differs between scenes
+    of a job (engine.columns), or the start of one run.
     """
 
     #: counters that the outcome has
@@ -76,6 +77,7 @@ class EventDrivenRun(ABC):
         self.whole, self.system, self.records = whole, system, records
         self.keep, self.max_events, self.log = events, max_events, records.log
         self.statistics, self.trace, self.status = UNJUDGED, UNTRACED, Status.OK
+        self.reader: Callable[[np.ndarray], int] = lambda _: 0
         self.begin_from(start)
         known, self._empty_flows, to_fill, *of_modes = self.rooms
         self.known, self.flows, self.assembly = known(system), self._empty_flows(system), to_fill(system)
@@ -175,6 +177,8 @@ class EventDrivenRun(ABC):
         while True:
             code = self._advance(periods, max_events)
             self._keep_log()
+            if len(self.records.course) and len(self.records.course) - self.records.noted[0] < COURSE_ROOM:
+                self._empty_course()
             if code == NEEDS_FLOW:
                 try:
                     self._add_flow()
@@ -191,6 +195,15 @@ class EventDrivenRun(ABC):
             self.chunks.append(self.log[: self.counters[LOGGED]].copy())
         self.listed += int(self.counters[LOGGED])
         self.counters[LOGGED] = 0
+
+    def _empty_course(self) -> None:
+        """Let the reader take what it can of the course; where too little is free then, there is to be more room."""
+        course, noted = self.records.course, self.records.noted
+        left = course[self.reader(course[: noted[0]]) : noted[0]].copy()
+        if len(left) + COURSE_ROOM > len(course):
+            larger = np.zeros((2 * (len(left) + COURSE_ROOM), course.shape[1]))
+            self.records = self.records._replace(course=larger)
+        self.records.course[: len(left)], noted[0] = left, len(left)
 
     def advance_to(self, periods: int) -> Status:
         """Advance to the end of `periods`, from the decision of the initial state. Return how that ended."""

@@ -28,12 +28,15 @@ from vanedamp.coupling.numerics.compiler.jit import kernel
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.quantities.sums import SUMS
 from vanedamp.coupling.response.figures import Measured, measure
+from vanedamp.coupling.response.records import MOST_PIECES
 from vanedamp.coupling.response.steadiness import LOOK, judged, known_after, run_ends
 from vanedamp.coupling.system.linear_modes import LinearModes, LinearParts
 from vanedamp.coupling.system.transient import Setup, begin_transient, run_length
 
 #: segments after which an engine returns, so that Python empties the log and sees interrupts; after which a job does
 SLICE, _SEGMENTS = 4096, 8 * 4096
+#: rows that the course of a run takes at most until its engine returns
+COURSE_ROOM = 2 * (SLICE + 1) + MOST_PIECES
 
 # numbers of a job: scenes, 0 for one that the caller judges; the present one; what comes next with it; its periods,
 # those left out and the longest run; the code that ends it; segments since Python has seen it; with which states
@@ -125,6 +128,11 @@ def run_scene(
         traced, until, events = len(trace.time) > 0, goal if at[COUNT] == 0 else at[GOAL], max_events
         if traced:
             until, events = next_leg(note_segment, system, flows, st, watched, scratch, trace)
+        last = until
+        if len(rec.course) > 0:  # which Python empties
+            if len(rec.course) - rec.noted[0] < COURSE_ROOM:
+                return PAUSED
+            until = min(until, st.counters[PERIOD] + 1)
         code = advance(system, flows, st, watched, rec, scratch, until, events)
         if code == NEEDS_FLOW:
             code = fill_known(system, subsystems, st, flows, assembly)
@@ -132,6 +140,8 @@ def run_scene(
                 return ON
         if traced:
             return noted(note_event, system, st, watched, rec, scratch, trace, code, goal, max_events, ON)
+        if code == DONE and until < last:
+            return ON
     if at[COUNT] == 0 or code == NEEDS_FLOW:
         return code
     if code == PAUSED:
@@ -238,7 +248,7 @@ def _clear(rec, done):
     last = min(done + 2, len(rec.peak))
     rec.peak[:last], rec.square[:last], rec.collided[:last], rec.impacts[:last] = 0.0, 0.0, 0.0, 0
     rec.harmonic[:last], rec.momentum[:last] = 0.0, 0.0
-    rec.section[0, :], rec.ledger[0, :], rec.parts[0, :] = 0.0, 0.0, 0.0
+    rec.section[0, :], rec.ledger[0, :], rec.parts[0, :], rec.noted[0] = 0.0, 0.0, 0.0, 0
     if rec.worn.shape[1] > 0:
         rec.worn[:last], rec.struck[:last], rec.hits[:last] = 0.0, 0.0, 0.0
     rec.tilt[:last], rec.lifted[:last], rec.walls[:last] = 0.0, 0.0, 0

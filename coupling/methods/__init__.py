@@ -49,6 +49,8 @@ class Method(Protocol):
     sentence that every run of such bodies with friction carries, and run_warnings, which yields sentences that every
     run of a scene without open choices carries.
 
+    COURSES = True: it writes down the course of the outputs that are asked for (response.records).
+
     SOFT_WALLS = True: rigid walls are springs in it, and results in which bodies are deep in them carry a warning.
     """
 

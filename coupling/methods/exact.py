@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # a scene takes the options without the engine
 VARIANTS = (Variant("exact engine", "#1d4f91", "*", setting=None),)
 RESTARTS = True
 WEARS = True
+COURSES = True
 PLANAR_LAWS = ("yields", "two_phases", "depends_on_speed")
 
 

@@ -88,9 +88,11 @@ def run_of(scene: Scene, observers: Sequence[Observer] = (), start: RestartState
     _check_bodies(scene, system)
     needs = together(observer.begin(scene, system) for observer in observers)
     scene.solver.check_samples(needs.samples)
+    if needs.course is not None:
+        system = system._replace(outputs=needs.course)
     records = new_records(
         system, most_periods(scene), needs.samples, isinstance(scene.structure, Rom), deflects(scene, system),
-        needs.exponent, needs.outputs,
+        needs.exponent, needs.outputs, needs.course is not None,
     )  # fmt: skip
     for observer in observers:
         records = observer.records(records)

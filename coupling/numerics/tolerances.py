@@ -45,6 +45,8 @@ LOST = 1e-9
 SLOW = 1e-2
 #: error of a peak's height, times the height, at which its search ends
 PEAK = 1e-13
+#: difference of outputs from the polynomials of their course, times the sizes of the modes' parts in them
+PIECE = 1e-9
 #: term of a series, times the sum so far, below which the series ends
 LAST_TERM = 1e-18
 

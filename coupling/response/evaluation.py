@@ -102,13 +102,15 @@ class Needs(NamedTuple):
     """What a run has to record for an observer.
 
     samples: of each period; log: whether to keep it; outputs: whether the largest values of further outputs are wanted;
-    exponent: of the energies of impacts, whose sums and numbers are counted by contact then.
+    exponent: of the energies of impacts, whose sums and numbers are counted by contact then; course: functionals (k, n)
+    of the modal coordinates whose course is wanted, as the system's further outputs.
     """
 
     samples: int = 0
     log: bool = False
     outputs: bool = False
     exponent: float | None = None
+    course: np.ndarray | None = None
 
 
 _NOTHING = Needs()
@@ -116,8 +118,9 @@ _NOTHING = Needs()
 
 def together(needs: Iterable[Needs]) -> Needs:
     """Return what a run has to record for all of some observers."""
-    samples, logs, outputs, exponents = zip(_NOTHING, *needs, strict=True)
-    return Needs(max(samples), any(logs), any(outputs), next(filter(None, exponents), None))
+    samples, logs, outputs, exponents, courses = zip(_NOTHING, *needs, strict=True)
+    course = next((one for one in courses if one is not None), None)
+    return Needs(max(samples), any(logs), any(outputs), next(filter(None, exponents), None), course)
 
 
 @dataclass
@@ -138,6 +141,13 @@ class Observer:
     def records(self, empty: Records) -> Records:
         """Return the records to which the run writes."""
         return empty
+
+    def linear(self, order: np.ndarray, motions: np.ndarray) -> Sequence[Any]:
+        """Return what is "linear" among the fields known before of f scenes, whose bodies are apart or fixed.
+
+        motions: (2, f, e, n) of harmonics of these orders (LinearResponse.motions). Empty: nothing is wanted.
+        """
+        return ()
 
     def look(self, run: Run, dropped: int | None) -> None:
         """Look at a run before it goes on; dropped: periods that will be left out, None if that is open."""

@@ -16,6 +16,8 @@ IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
 WIDTH, LINE_WIDTH = 8, 6
 #: entries of the energy balance
 EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
+#: rows of a course at first; pieces of a period in it at most, beside one of each segment
+_COURSE, MOST_PIECES = 2**16, 4096
 
 
 @record_with(free_axes=2)
@@ -47,7 +49,11 @@ class Records(NamedTuple):
     # (periods + 1, k, 3) of further outputs (System.outputs): largest |value|, or where bodies bring a static load as
     # `swing`; -inf: not noted; k = 0: not wanted
     outputs: np.ndarray
-    counted: np.ndarray  # (1,) int: period from which on they are noted
+    counted: np.ndarray  # (1,) int: period from which on they are noted, and the course
+    # (rows, 2 + 4k) course of the further outputs (energy_forms): the period, the time to the next row, s, 0 at the end
+    # of a segment, the outputs, and their first three derivatives; rows = 0: not wanted
+    course: np.ndarray
+    noted: np.ndarray  # (1,) int: its rows so far
 
     @property
     def samples_per_period(self) -> int:
@@ -57,13 +63,13 @@ class Records(NamedTuple):
 
 def new_records(
     system: System, periods: int, samples: int, coordinates: bool = False, deflected: bool = False,
-    exponent: float | None = None, outputs: bool = False,
+    exponent: float | None = None, outputs: bool = False, course: bool = False,
 ) -> Records:  # fmt: skip
     """Return empty records for `periods` periods with `samples` samples each.
 
     coordinates: of these samples as well; deflected: whether loads of the bodies deflect the structure;
     exponent: of the energies of impacts that wear; None: wear is not wanted; outputs: whether largest values of the
-    further outputs are wanted.
+    further outputs are wanted; course: whether their course is.
     """
     b = system.bodies
     kept = np.empty((periods * samples, system.modes if coordinates else 0))
@@ -84,5 +90,6 @@ def new_records(
         swing=np.tile([-np.inf, np.inf, 0.0], ((periods + 1) * deflected, 1)),
         worn=worn, struck=struck, hits=hits, exponent=np.array([1.0 if exponent is None else exponent]),
         outputs=np.tile([-np.inf, np.inf, 0.0], (periods + 1, len(system.outputs) * outputs, 1)),
-        counted=np.zeros(1, np.int64),
+        counted=np.zeros(1, np.int64), course=np.zeros((_COURSE * course, 2 + 4 * len(system.outputs))),
+        noted=np.zeros(1, np.int64),
     )  # fmt: skip

@@ -14,7 +14,7 @@ from vanedamp.coupling.strength.stress import scalar_stresses, signs
 
 
 class SpotHistories:
-    """Turning points of the criterion's stress at s spots, about the mean of the samples that came first.
+    """Turning points of the criterion's stress at s spots, about the mean of what came first.
 
     It counts as tensile where the stress goes with the largest one of these samples, if that is tensile. Spots without
     a curve of stress and life have no history.
@@ -24,6 +24,7 @@ class SpotHistories:
     mean: np.ndarray
 
     def __init__(self, materials: Sequence[Fatigue | None]) -> None:
+        self.wanted = any(material is not None and material.exponent is not None for material in materials)
         self._rows = {
             place: SCALARS.index(material.criterion)
             for place, material in enumerate(materials)
@@ -32,12 +33,12 @@ class SpotHistories:
         self.mean, self._reference = np.zeros(0), np.zeros(0)
         self._points: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {place: [] for place in self._rows}
 
-    def add(self, begin: int, stress: np.ndarray) -> None:
-        """Add samples (s, 6, t) of stress, Pa, of which the first has the number `begin`."""
+    def add(self, periods: np.ndarray, stress: np.ndarray, mean: np.ndarray) -> None:
+        """Add samples (s, 6, t) of stress, Pa, in periods (t,), and their mean (s, 6)."""
         if not stress.shape[-1]:
             return
         if not self.mean.size:
-            self.mean = stress.mean(axis=-1)
+            self.mean = mean
         if not self._rows:
             return
         about = np.moveaxis(stress - self.mean[..., None], 1, 0)
@@ -49,15 +50,15 @@ class SpotHistories:
         signed = signs(about, self._reference) * scalars
         for place, row in self._rows.items():
             kept = turning_points(signed[row, place])
-            self._points[place].append((begin + kept, signed[row, place, kept]))
+            self._points[place].append((periods[kept], signed[row, place, kept]))
 
     def cycles(self, place: int, first: int = 0, repeats: bool = False) -> Cycles | None:
-        """Return the cycles of a spot from a sample on; None without any sample, or a curve.
+        """Return the cycles of a spot from a period on; None without any sample, or a curve.
 
         repeats: the motion repeats what is counted (counting.rainflow_cycles).
         """
         if not self._points.get(place):
             return None
-        numbers, values = (np.concatenate(arrays) for arrays in zip(*self._points[place], strict=True))
-        values = values[numbers >= first]
+        periods, values = (np.concatenate(arrays) for arrays in zip(*self._points[place], strict=True))
+        values = values[periods >= first]
         return rainflow_cycles(values, repeats) if values.size else None

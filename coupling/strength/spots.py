@@ -17,6 +17,7 @@ from vanedamp.coupling.system.system import System
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.recovery import COMPONENTS, hot_spots
 
+_TINY = float(np.finfo(float).tiny)
 #: samples per period of the highest harmonic, and of any motion; impacts take up to so many
 OF_HARMONIC, _LEAST, _MOST = 16, 48, 192
 #: fraction of the amplitude that samples may miss by estimate (`samples_of`)
@@ -40,6 +41,18 @@ class Spots:
     def size(self) -> np.ndarray:
         """(s, n) a norm of the stress per modal coordinate, Pa."""
         return np.sqrt((self.rows**2).sum(axis=1))
+
+    @cached_property
+    def outputs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Functionals (k, n) of a course by which stresses are followed, Pa, and stresses (s, 6, k) by these.
+
+        The modes' own stresses, or where there are more modes than components, these.
+        """
+        rows = self.rows.reshape(-1, len(self.squares))
+        if len(rows) < len(self.squares):
+            return rows, np.eye(len(rows)).reshape(*self.rows.shape[:2], -1)
+        sizes = np.maximum(np.sqrt((rows**2).sum(axis=0)), _TINY)
+        return np.diag(sizes), self.rows / sizes
 
     @cached_property
     def materials(self) -> list[Fatigue | None]:

@@ -1,12 +1,7 @@
-"""Stress at the hot spots of a run, period by period as it advances.
-
-It is taken from samples of the modal coordinates, some 100 per period of every mode: in the evaluated periods only,
-where these are known before. Samples are dropped as soon as their stress is taken, and their memory is given back.
-"""
+"""Stress at the hot spots of a run, in the evaluated periods as it advances."""
 
 from __future__ import annotations
 
-import mmap
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,12 +10,13 @@ import numpy as np
 from vanedamp.coupling.engine.run import EventDrivenRun
 from vanedamp.coupling.quantities.stress import LINEAR, MEASURES
 from vanedamp.coupling.response.evaluation import Fields, Needs, Observer, Outcome, Run
-from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.spot_stress import SpotStress, named, scalars
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.waveforms.multisine import Multisine
 from vanedamp.coupling.strength.assessment import with_strength
-from vanedamp.coupling.strength.linear_stress import linear_stresses
+from vanedamp.coupling.strength.course import course_stress, sampled_course
+from vanedamp.coupling.strength.linear_stress import linear_stresses, stresses_of
 from vanedamp.coupling.strength.spot_history import SpotHistories
 from vanedamp.coupling.strength.spots import Spots, samples_of
 from vanedamp.coupling.strength.stress import PeriodStress, every_other, period_stress
@@ -29,96 +25,97 @@ from vanedamp.coupling.system.system import System
 
 #: periods of those evaluated together by which the error of sampling is measured
 _CHECKED = 8
-#: fields of the records with a row for every sample
-_SAMPLED = ("samples", "coordinates", "sampled", "shut")
-#: samples that are evaluated together, in whole periods
-_TOGETHER = 20_000
+#: periods of a course that are evaluated together
+_TOGETHER = 100
 
 
 class StressObserver(Observer):
-    """Keeps the stress of every period; asked: samples of each that others keep."""
+    """Keeps the stress of every period; asked: samples of each that others keep.
+
+    Runs of the exact engine are taken as their course, others as samples.
+    """
 
     def __init__(self, spots: Spots, asked: int) -> None:
         super().__init__(self._stress)
         self.spots, self.asked, self.each = spots, asked, 0
-        self._rooms: list[tuple[np.ndarray, mmap.mmap]] = []
-        self._whole: Records
-        self._taken, self._sampling, self._first = 0, True, -1
+        self._begin_again()
+
+    def _begin_again(self) -> None:
+        self._taken = 0
         self._parts: list[tuple[int, PeriodStress]] = []
-        self._checked = np.zeros((2, len(spots.rows)))
-        self._histories = SpotHistories(spots.materials)
+        self._checked = np.zeros((2, len(self.spots.rows)))
+        self._histories = SpotHistories(self.spots.materials)
 
     def begin(self, scene: Scene, system: System) -> Needs:
-        """Return the samples from which stresses are taken."""
+        """Return the samples from which stresses are taken, or the coordinates whose course is."""
+        if getattr(METHODS.part(scene.solver.method), "COURSES", False):
+            return Needs(course=self.spots.outputs[0])
         self.each = samples_of(scene, system, self.spots, self.asked)
         return Needs(samples=self.each)
 
-    def records(self, empty: Records) -> Records:
-        """Return the records with samples whose memory can be given back."""
-        self._whole = empty._replace(**{name: self._room(getattr(empty, name)) for name in _SAMPLED})
-        return self._whole
+    def linear(self, order: np.ndarray, motions: np.ndarray) -> list[dict[str, np.ndarray]]:
+        """Return the amplitudes of stress of both curves of every scene."""
+        return [dict(zip(LINEAR, both, strict=True)) for both in stresses_of(order, motions, self.spots)]
 
     def look(self, run: Run, dropped: int | None) -> None:
-        """Take the periods done since the last call, and sample what follows if it may be evaluated."""
-        self._take_up_to(run.outcome().periods)
-        if isinstance(run, EventDrivenRun) and not self.asked:
-            self._sampling = dropped is None or self._taken >= dropped
-            none = {name: getattr(self._whole, name)[:0] for name in _SAMPLED}
-            run.records = self._whole if self._sampling else self._whole._replace(**none)
-        self._whole.coordinates[self._taken * self.each :][:1] = np.nan  # remains if a method keeps none
+        """Take the periods done since the last call, or the course as it fills."""
+        if isinstance(run, EventDrivenRun):
+            run.reader = self._take_course
+        else:
+            self._take_samples(run.outcome())
 
-    def _take_up_to(self, done: int) -> None:
-        """Take the periods up to `done`, and give their samples back."""
-        begin, self._taken = self._taken, done
-        if not self._sampling or done <= begin:
-            return
-        q, together = self._whole.coordinates, max(_TOGETHER // self.each, 1)
-        if np.isnan(q[begin * self.each]).any():
-            return
-        for first in range(begin, done, together):
-            self._take(q, first, min(first + together, done))
+    def _take_course(self, course: np.ndarray, last: int | None = None) -> int:
+        """Take what there is of a course: groups of periods that are whole, or all up to the last. Return its rows."""
+        periods = course[:, 0]
+        if not len(periods):
+            return 0
+        first, last = int(periods[0]), int(periods[-1]) // _TOGETHER * _TOGETHER if last is None else last
+        while first < last:
+            next_one = min((first // _TOGETHER + 1) * _TOGETHER, last)
+            rows = course[slice(*np.searchsorted(periods, (first, next_one)))]
+            found = course_stress(rows, self.spots.outputs[1])
+            self._parts.append((first, found))
+            if self._histories.wanted:
+                self._histories.add(*sampled_course(rows, self.spots.outputs[1]), found.mean.mean(axis=0))
+            first = next_one
+        return int(np.searchsorted(periods, last))
 
-    def _take(self, q: np.ndarray, begin: int, done: int) -> None:
-        """Take some periods of the samples (n, modes) of the run, and give these back."""
-        each, rows = self.each, slice(begin * self.each, done * self.each)
-        self._first = rows.start if self._first < 0 else self._first
-        # a sample more at both ends; the first one has none before it where the periods before were not sampled
-        before = q[max(rows.start - 1, self._first)]
-        stress = self.spots.stress(np.concatenate([before[None], q[rows], q[rows][-1:]]))
+    def _take_samples(self, run: Outcome) -> None:
+        """Take the periods of samples done since the last call."""
+        begin, done, q, each = self._taken, run.periods, run.records.coordinates, self.each
+        self._taken = done
+        if done <= begin or np.isnan(q[begin * each]).any():
+            return
+        # a sample more at both ends
+        before, rows = q[max(begin * each - 1, 0)], q[begin * each : done * each]
+        stress = self.spots.stress(np.concatenate([before[None], rows, rows[-1:]]))
         found = period_stress(stress, each)
         self._parts.append((begin, found))
-        self._histories.add(begin * each, stress[..., 1:-1])
+        periods = np.repeat(np.arange(begin, done), each)
+        self._histories.add(periods, stress[..., 1:-1], stress[..., 1:-1].mean(axis=-1))
         few = min(_CHECKED, len(found.mean))
         if each % 2 == 0:
             halved = period_stress(every_other(stress[..., : few * each + 2]), each // 2)
             for total, part in zip(self._checked, (found, halved), strict=True):
                 total += part.amplitude[:few, :, MEASURES.index("von_mises")].sum(axis=0)
-        if not self.asked:
-            for array, room in self._rooms:
-                _give_back(room, array.strides[0], rows.start - 1, rows.stop - 1)
-
-    def _room(self, like: np.ndarray) -> np.ndarray:
-        """Return an array of zeros like another, in memory of its own."""
-        if not like.nbytes:
-            return like
-        room = mmap.mmap(-1, like.nbytes, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-        array = np.frombuffer(room, like.dtype).reshape(like.shape)
-        self._rooms.append((array, room))
-        return array
 
     def _stress(self, scene: Scene, run: Outcome, known: Fields) -> Fields:
         """Return the stress over the periods evaluated."""
-        self._take_up_to(run.periods)
-        first = known["transient"]
-        parts = [PeriodStress(*(array[max(first - begin, 0) :] for array in part)) for begin, part in self._parts]
+        if self.each:
+            self._take_samples(run)
+        else:
+            self._take_course(run.records.course[: run.records.noted[0]], run.periods)
+        first, own, (all_of, half), histories = known["transient"], self._parts, self._checked, self._histories
+        self._begin_again()
+        parts = [PeriodStress(*(array[max(first - begin, 0) :] for array in part)) for begin, part in own]
         whole = PeriodStress(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True))) if parts else None
         if whole is None or not len(whole.mean):
             return {}
-        all_of, half = self._checked
         error = np.abs(half - all_of) / np.where(all_of > 0.0, all_of, 1.0)
-        spots = _spot_stresses(self.spots, whole, linear_stresses(scene, self.spots), self.each, error)
+        linear = known.get("linear") or linear_stresses(scene, self.spots, run.system)
+        spots = _spot_stresses(self.spots, whole, linear, self.each, error)
         repeats, duration = known["classification"] != "non-periodic", len(whole.mean) / scene.frequency
-        counted = [self._histories.cycles(place, first * self.each, repeats) for place in range(len(spots))]
+        counted = [histories.cycles(place, first, repeats) for place in range(len(spots))]
         noise = linear_moments(scene, self.spots) if isinstance(scene.excitation.waveform, Multisine) else {}
         spectra = [{curve: of[place] for curve, of in noise.items()} for place in range(len(spots))]
         parts_of = zip(spots, self.spots.materials, counted, spectra, strict=True)
@@ -152,11 +149,3 @@ def _spot_stresses(
             )
         )  # fmt: skip
     return tuple(made)
-
-
-def _give_back(room: mmap.mmap, row: int, first: int, last: int) -> None:
-    """Give rows of so many bytes back to the system, from the first one up to the last, without pages of others."""
-    begin = -(-max(first, 0) * row // mmap.PAGESIZE) * mmap.PAGESIZE
-    end = last * row // mmap.PAGESIZE * mmap.PAGESIZE
-    if end > begin and hasattr(mmap, "MADV_DONTNEED"):
-        room.madvise(mmap.MADV_DONTNEED, begin, end - begin)

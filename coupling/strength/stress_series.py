@@ -27,7 +27,7 @@ class StressSeries:
     def __init__(self, spots: Spots, each: int) -> None:
         self.spots, self.each, self._last = spots, each, spots
         self._waiting, self._amplitudes = list[np.ndarray](), list[np.ndarray]()
-        self._histories, self._taken = SpotHistories(spots.materials), 0
+        self._histories = SpotHistories(spots.materials)
 
     def add(self, scene: Scene, coordinates: np.ndarray) -> None:
         """Take modal coordinates (each, n) of the next period, and the scene then, whose speed may have changed."""
@@ -84,6 +84,5 @@ class StressSeries:
         stress = np.concatenate(self._waiting, axis=-1)
         padded = np.concatenate([stress[..., :1], stress, stress[..., -1:]], axis=-1)
         self._amplitudes.append(period_stress(padded, self.each).amplitude)
-        self._histories.add(self._taken, stress)
-        self._taken += stress.shape[-1]
+        self._histories.add(np.zeros(stress.shape[-1]), stress, stress.mean(axis=-1))
         self._waiting.clear()

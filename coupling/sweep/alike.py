@@ -44,7 +44,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.paths import with_numbers
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import FILE_PATHS, Scene
-from vanedamp.coupling.simulation import parts_of
+from vanedamp.coupling.simulation import parts_of_run
 from vanedamp.coupling.sweep.grid import Points, PointTable
 from vanedamp.coupling.sweep.row import PARTS, Row
 from vanedamp.coupling.system.linear_response import linear_responses
@@ -68,8 +68,10 @@ class Kind:
 
     def __init__(self, scene: Scene) -> None:
         """Take the first scene, without open choices. Raises InputError or ValueError for one that is no such scene."""
-        self.observers = parts_of(scene)
+        self.observers = parts_of_run(scene)
         run = run_of(scene, self.observers)
+        for observer in self.observers:
+            observer.look(run, None)
         if not isinstance(run, EventDrivenRun) or scene.contact.parallel:
             raise ValueError("not a scene of the exact engine, or one whose contacts begin at several gaps")
         run.check()
@@ -99,7 +101,8 @@ class Kind:
         kind, bodies = LINKS if linked else GIVEN if given else OWN, run.whole.bodies * run.whole.in_plane
         job = new_job(size, most_periods(self.scene), kind, run.keep, bodies)
         table = self._columns(values, given, linked, job)
-        first = given[0] if linked and given else None
+        first, motions = given[0] if linked and given else None, self._motions(table, values)
+        linear = [one for observer in self.observers for one in observer.linear(self.linear[0].order, motions)]
         for count in [size] if keep is None else range(1, size + 1):
             job.at[COUNT] = count
             while run.run_many(job, table, self.statistics) == OUTSIDE:
@@ -113,8 +116,9 @@ class Kind:
                 job.at[PLACE], job.at[STAGE] = place + 1, BEGINS
                 job.at[LEFT] = job.at[LEFT] if left is None else place + 1
             if keep is not None and job.codes[count - 1]:
-                keep(count - 1, self._parts(job, table, values, count - 1))
-        return job, self._linear(table, values), self._left(job, size, first) if linked else None
+                keep(count - 1, self._parts(job, table, values, linear, count - 1))
+        amplitudes = np.transpose([curve.heights(own) for curve, own in zip(self.linear, motions, strict=True)])
+        return job, amplitudes, self._left(job, size, first) if linked else None
 
     def ended(self, job: Job, k: int) -> tuple[Status, str]:
         """Return how scene k of a job has ended, and the class of its motion."""
@@ -134,7 +138,9 @@ class Kind:
         """Return the state that scene k of the last job has left, which are not linked."""
         return marked_with_speed(self.scene, self.run.start_in(k, k))
 
-    def _parts(self, job: Job, table: Columns, values: Mapping[str, np.ndarray], k: int) -> dict[str, Any]:
+    def _parts(
+        self, job: Job, table: Columns, values: Mapping[str, np.ndarray], linear: Sequence[Any], k: int
+    ) -> dict[str, Any]:
         """Return what is kept of the run of scene k, which has just ended, by name."""
         run = self.run.outcome()
         first, b = min(int(job.at[DROPPED]), max(run.periods - 1, 0)), self.run.system.bodies
@@ -144,6 +150,7 @@ class Kind:
             scene = with_numbers(self.scene, self._data, {path: float(numbers[k]) for path, numbers in values.items()})
             run, known = replace(run, system=self.run.whole_in(table, k)), dict[str, Any](transient=first)
             known["energy"] = {name: float(job.sums[k, SUMS.index(name)]) for name in ENERGIES}
+            known |= {"classification": class_name(int(job.kinds[k]))} | ({"linear": linear[k]} if linear else {})
             found |= dict.fromkeys(PARTS)
             for observer in self.observers:
                 found |= observer.fields(scene, run, known)
@@ -175,16 +182,16 @@ class Kind:
         left = int(job.at[LEFT])
         return start if left == 0 else marked_with_speed(self.scene, self.run.start_in(place, left - 1))
 
-    def _linear(self, table: Columns, values: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the amplitudes (k, 2) without bodies and with fixed ones, m."""
+    def _motions(self, table: Columns, values: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the linear motions (2, k, e, n) without bodies and with fixed ones."""
         size, n = len(next(iter(values.values()))), self.run.system.modes
         frequency, found = values.get(FREQUENCY, np.full(size, self.scene.frequency)), []
         for response in self.linear:
             load = None
             if any(path in values for path in LEVELS):
                 load = table.load[:size, np.isin(self.run.whole.order, response.order), :n]
-            found.append(response.amplitude(frequency, load))
-        return np.transpose(found)
+            found.append(response.motions(frequency, load))
+        return np.array(found)
 
 
 def _own(record: Any) -> Any:

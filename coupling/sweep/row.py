@@ -22,8 +22,8 @@ NOT_IN_SWEEPS: dict[str, str] = {}
 #: texts of every point
 TEXTS = ("status", "classification")
 _SECTION = "section"
-#: what observers of runs in compiled code keep (simulation.parts_of)
-PARTS = ("wear", "sectors", "contacts")
+#: what observers of runs in compiled code keep (simulation.parts_of_run)
+PARTS = ("wear", "sectors", "contacts", "stress")
 
 
 class Row:

@@ -62,9 +62,11 @@ class LinearResponse:
         load: (f, e, n) at each of them in place of its own. Infinite at a frequency that is, to the last bit, a
         resonance without damping. The same digits for one frequency as for many.
         """
-        frequencies = np.asarray(frequencies, float)
-        loads = np.broadcast_to(self.load if load is None else load, (len(frequencies), *self.load.shape))
-        waves = np.array([self._wave(h, frequencies, loads[:, h]) for h in range(len(self.order))])
+        return self.heights(self.motions(frequencies, load))
+
+    def heights(self, motions: np.ndarray) -> np.ndarray:
+        """Return amplitudes of the response (f,), m, of `motions`."""
+        waves = ((motions * self.response).sum(axis=-1) + self.table).T
         finite = np.isfinite(waves).all(axis=0)
         amplitude = np.full(len(finite), np.inf)
         amplitude[finite] = np.abs(waves[0, finite]) if len(waves) == 1 else peaks(waves[:, finite], self.order)
@@ -89,18 +91,22 @@ class LinearResponse:
         omega = 2 * np.pi * frequency * self.order
         return steady_motion(self.stiffness, self.damping, self.mass, self.load, omega)
 
-    def _wave(self, h: int, frequencies: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Return complex amplitudes (f,) of harmonic h of the response, m, at frequencies (f,), Hz; load: (f, n)."""
+    def motions(self, frequencies: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
+        """Return the same (f, e, n) at frequencies (f,), infinite there; arguments as of `amplitude`."""
+        frequencies = np.asarray(frequencies, float)
+        loads = np.broadcast_to(self.load if load is None else load, (len(frequencies), *self.load.shape))
+        return np.stack([self._motion(h, frequencies, loads[:, h]) for h in range(len(self.order))], axis=1)
+
+    def _motion(self, h: int, frequencies: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Return those of harmonic h (f, n); load: (f, n)."""
         omega = 2 * np.pi * self.order[h] * frequencies
         try:
-            motion = steady_motion(self.stiffness, self.damping, self.mass, load, omega)
+            return steady_motion(self.stiffness, self.damping, self.mass, load, omega)
         except np.linalg.LinAlgError:
             if len(frequencies) == 1:
-                return np.array([complex(np.inf)])
+                return np.full(load.shape, complex(np.inf))
             halves = (np.array_split(part, 2) for part in (frequencies, load))
-            return np.concatenate([self._wave(h, *half) for half in zip(*halves, strict=True)])
-        wave: np.ndarray = (motion * self.response).sum(axis=1) + self.table[h]
-        return wave
+            return np.concatenate([self._motion(h, *half) for half in zip(*halves, strict=True)])
 
     def peak(self, low: float, high: float) -> LinearPeak:
         """Return the largest amplitude from low to high, Hz, to round-off; at an end where no resonance is higher."""

@@ -12,7 +12,7 @@ from unittest import mock
 
 import numpy as np
 
-from tests.tools.scene_strategies import model_file
+from tests.tools.scene_strategies import model_file, stressed_file
 from vanedamp.coupling.model_order.choices import NOTHING
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep import worker
@@ -37,6 +37,7 @@ def random_sweep(seed: int) -> RandomSweep:
     tables, linked = _tables(rng), bool(rng.random() < 0.4)
     tables |= _kept(np.random.default_rng([seed, 50]), tables)
     tables |= _in_plane(np.random.default_rng([seed, 51]), tables)
+    tables |= _stressed(np.random.default_rng([seed, 52]), tables)
     scene = validate(Scene, tables, f"random sweep {seed}")
     drawn = dict(_axes(rng, scene))
     paths = rng.permutation(list(drawn))[: rng.integers(1, 5)].tolist()
@@ -126,6 +127,13 @@ def _in_plane(rng: np.random.Generator, tables: dict[str, Any]) -> dict[str, Any
     gravity = {"acceleration": float(rng.choice([0.02, 0.1]))}
     law = tables.get("contact", {}) if "pair" in tables.get("contact", {}) else laws[rng.integers(3)]
     return {"damper": bodies, "cavity": plays, "gravity": gravity, "contact": law}
+
+
+def _stressed(rng: np.random.Generator, tables: dict[str, Any]) -> dict[str, Any]:
+    """Return tables, in most sweeps of reduced models, with hot spots."""
+    if tables["structure"]["model"] != "rom" or rng.random() < 0.3:
+        return {}
+    return {"structure": tables["structure"] | {"file": stressed_file(tables["structure"]["file"])}}
 
 
 def _axes(rng: np.random.Generator, scene: Scene) -> Iterator[tuple[str, Any]]:

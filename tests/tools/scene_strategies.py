@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
+from vanedamp.rom.recovery import with_stresses
 from vanedamp.rom.reduced import ReducedModel
 
 LAWS = ("newton", "compliant")
@@ -79,6 +81,19 @@ def model_file(seed: int, modes: int) -> str:
     path = Path(_folder().name) / f"{modes}-{seed}.h5"
     model.save(path)
     return str(path)
+
+
+@cache
+def stressed_file(file: str) -> str:
+    """File of the same model with two random hot spots, one of which has a curve of stress and life."""
+    model = ReducedModel.load(file)
+    rng = np.random.default_rng(len(model.mass))
+    curve = {"strength": 1.0, "exponent": 5.0, "knee": 1e6, "tensile_strength": 3.0, "criterion": "principal"}
+    facts = {"hot1": {"fatigue": curve}, "hot2": {"static": {"temperature": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]}}}
+    made = replace(model, provenance=model.provenance | {"hot_spots": facts})
+    path = file.replace(".h5", "-stressed.h5")
+    with_stresses(made, {name: rng.standard_normal((6, len(model.mass))) for name in facts}).save(path)
+    return path
 
 
 @cache

@@ -56,7 +56,7 @@ def columns(
         except InputError:
             outside.append(k)
             continue
-        others = [name for name in System._fields if name not in _WITH_COLUMNS]
+        others = [name for name in System._fields if name not in (*_WITH_COLUMNS, "outputs")]
         if not all(np.array_equal(getattr(system, name), getattr(whole, name), equal_nan=True) for name in others):
             outside.append(k)
             continue

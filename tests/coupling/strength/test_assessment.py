@@ -21,7 +21,8 @@ def histories(amplitude, static, parts, material, samples=100, periods=60):
     stress = static + amplitude * np.sin(2.0 * np.pi * (0.25 + np.arange(samples * periods) / samples))
     found = SpotHistories([material])
     for begin, end in zip(parts, [*parts[1:], samples * periods], strict=True):
-        found.add(begin, (UNIAXIAL[:, None] * stress[begin:end])[None])
+        part = (UNIAXIAL[:, None] * stress[begin:end])[None]
+        found.add(np.arange(begin, end), part, part.mean(axis=-1))
     return found
 
 
@@ -68,5 +69,5 @@ def test_spots_may_have_several_materials():
     stress = np.zeros((3, 6, 200))
     stress[:, 0] = 1e8 * np.sin(2.0 * np.pi * np.arange(200) / 100.0)
     found = SpotHistories([None, Fatigue(**DATA), Fatigue(strength=1e8)])
-    found.add(0, stress)
+    found.add(np.zeros(200), stress, stress.mean(axis=-1))
     assert [found.cycles(place) is None for place in range(3)] == [True, False, True]
