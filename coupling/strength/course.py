@@ -27,8 +27,10 @@ _ROUND_OFF = 1e-14
 _SHEAR = math.sqrt(0.75)
 #: steps to a peak at most
 _STEPS = 40
-#: squared sine between rows of a tensor, below which they are parallel
-_PARALLEL = 1e-20
+#: gain of a step to a peak, times its height, that is right enough to be added
+_SURE = 1e-10
+#: difference of principal stresses over the third's, below which they are equal
+_EQUAL = 1e-10
 _TINY = float(np.finfo(float).tiny)
 #: places within a piece, over its length, at which histories are sampled
 _SAMPLED = np.arange(4) / 4
@@ -175,7 +177,7 @@ def _set_bends(p, value, bends, n):
         turn += 2.0 * (p[9, i] * p[9, i] + p[10, i] * p[10, i] + p[11, i] * p[11, i])
         bend = p[12, i] * p[12, i] + p[13, i] * p[13, i] + p[14, i] * p[14, i]
         bend += 2.0 * (p[15, i] * p[15, i] + p[16, i] * p[16, i] + p[17, i] * p[17, i])
-        bends[i] = 2.0 * math.sqrt(bend) + turn / most
+        bends[i] = 1.25 * math.sqrt(bend) + 1.5 * turn / most
 
 
 @summing
@@ -264,7 +266,7 @@ def _set_rises(value, up, down, bends, goes, ahead, sign, side, top, rise, n):
         )
         with_a, with_b = side * goes[i], side * goes[i + 1]
         # where the slope does not vanish the largest value is that of an end
-        inside = ((a > 0.0) & (b < 0.0)) | (abs(a) + abs(b) < 1.5 * bend) | (with_a * with_b < 0.0)
+        inside = (a > 0.0) & (b < 0.0) | (abs(a) + abs(b) < bend) | (with_a * with_b < 0.0)
         found = found if inside & (ahead[i] > 0.0) & ((with_a >= 0.0) | (with_b >= 0.0)) else 0.0
         rise[i] = found
         most = max(most, found)
@@ -284,37 +286,50 @@ def _piece(places, goes, point, i, kind, sign, side, top):
             a, value_a, slope_a, with_a = _at(places, point, i, turn, kind, sign, side)
         else:
             b, value_b, slope_b, with_b = _at(places, point, i, turn, kind, sign, side)
-    top = max(top, max(value_a if side * with_a >= 0.0 else 0.0, value_b if side * with_b >= 0.0 else 0.0))
+    top = max(top, max(value_a, value_b))
     if slope_a > 0.0 > slope_b:
-        return _peak(places, point, i, a, slope_a, b, slope_b, kind, sign, side, top)
+        return _peak(places, point, i, a, value_a, slope_a, b, value_b, slope_b, kind, sign, side, top)
     # the slope may change its sign twice
     middle, value, slope, _ = _at(places, point, i, 0.5 * (a + b), kind, sign, side)
     top = max(top, value)
     if slope_a > 0.0 > slope:
-        return _peak(places, point, i, a, slope_a, middle, slope, kind, sign, side, top)
+        return _peak(places, point, i, a, value_a, slope_a, middle, value, slope, kind, sign, side, top)
     if slope > 0.0 > slope_b:
-        return _peak(places, point, i, middle, slope, b, slope_b, kind, sign, side, top)
+        return _peak(places, point, i, middle, value, slope, b, value_b, slope_b, kind, sign, side, top)
     return top
 
 
 @kernel
-def _peak(places, point, i, a, slope_a, b, slope_b, kind, sign, side, top):
-    """Return the value where the slope vanishes between a and b, or what there was: by secants (Illinois)."""
-    before, last = a, 0
+def _peak(places, point, i, a, value_a, slope_a, b, value_b, slope_b, kind, sign, side, top):
+    """Return the value where the slope vanishes between a and b, or what there was.
+
+    By Newton's method from the cubic through the ends, with its curvature: what a step still gains is right to some
+    hundredths.
+    """
+    begin, h, rise = a, b - a, value_b - value_a
+    start = h * slope_a
+    bend, third = 6.0 * rise - 4.0 * start - 2.0 * h * slope_b, 3.0 * (start + h * slope_b) - 6.0 * rise
+    down = math.sqrt(max(bend * bend - 4.0 * third * start, 0.0)) - bend
+    u = 2.0 * start / down if down > 0.0 else 0.5
+    t = begin + h * u if 0.0 < u < 1.0 else a + h * slope_a / (slope_a - slope_b)
     for _ in range(_STEPS):
-        t = a + (b - a) * slope_a / (slope_a - slope_b)
         _, value, slope, _ = _at(places, point, i, t, kind, sign, side)
-        if value > top:
-            top = value
+        curve = (bend + 2.0 * third * (t - begin) / h) / (h * h)
+        gain = -0.5 * slope * slope / curve if curve < 0.0 else math.inf
+        found = gain <= _SURE * value
+        height = value + gain if found else value
+        if height > top:
+            top = height
             if kind == _VON_MISES and side == 0.0:
                 _copy(point[2], point[0])
-        if abs(slope * (t - before)) <= PEAK * abs(value):
+        if found:
             break
-        before = t
         if slope > 0.0:
-            a, slope_a, slope_b, last = t, slope, 0.5 * slope_b if last == 1 else slope_b, 1
+            a, slope_a = t, slope
         else:
-            b, slope_b, slope_a, last = t, slope, 0.5 * slope_a if last == -1 else slope_a, -1
+            b, slope_b = t, slope
+        step = t - slope / curve if curve < 0.0 else a
+        t = step if a < step < b else 0.5 * (a + b)
     return top
 
 
@@ -436,29 +451,20 @@ def _magnitude_and_slope(point):
 
 @kernel
 def _along(point, value):
-    """Return the slope of a principal stress: that of the stress along its direction."""
+    """Return the slope of a principal stress: with the adjugate of the stress less this one, a square of its direction.
+
+    Of two that are equal it is the mean, of all three as well.
+    """
     s, r = point[0], point[1]
-    a, b, c = s[0] - value, s[1] - value, s[2] - value
-    # cross products of the rows of the stress less the principal one: along its direction
-    x0, y0, z0 = s[3] * s[4] - s[5] * b, s[5] * s[3] - a * s[4], a * b - s[3] * s[3]
-    x1, y1, z1 = b * c - s[4] * s[4], s[4] * s[5] - s[3] * c, s[3] * s[4] - b * s[5]
-    x2, y2, z2 = s[3] * c - s[5] * s[4], s[5] * s[5] - a * c, a * s[4] - s[5] * s[3]
-    size0, size1, size2 = x0 * x0 + y0 * y0 + z0 * z0, x1 * x1 + y1 * y1 + z1 * z1, x2 * x2 + y2 * y2 + z2 * z2
-    x, y, z, size = x0, y0, z0, size0
-    if size1 > size:
-        x, y, z, size = x1, y1, z1, size1
-    if size2 > size:
-        x, y, z, size = x2, y2, z2, size2
-    longest = a * a + b * b + c * c + 2.0 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5])
-    if size <= _PARALLEL * longest * longest:  # two principal stresses are equal: any direction across the third
-        x, y, z = a, s[3], s[5]
-        if abs(s[3]) + abs(b) + abs(s[4]) > abs(x) + abs(y) + abs(z):
-            x, y, z = s[3], b, s[4]
-        if abs(s[5]) + abs(s[4]) + abs(c) > abs(x) + abs(y) + abs(z):
-            x, y, z = s[5], s[4], c
-        x, y, z = (0.0, -z, y) if abs(x) < max(abs(y), abs(z)) else (-y, x, 0.0)
-        if x == 0.0 and y == 0.0 and z == 0.0:
-            x = 1.0
-        size = x * x + y * y + z * z
-    turned = r[0] * x * x + r[1] * y * y + r[2] * z * z + 2.0 * (r[3] * x * y + r[4] * y * z + r[5] * z * x)
-    return turned / size
+    a, b, c, d, e, f = s[0] - value, s[1] - value, s[2] - value, s[3], s[4], s[5]
+    x, y, z = b * c - e * e, a * c - f * f, a * b - d * d
+    turned = r[0] * x + r[1] * y + r[2] * z
+    turned += 2.0 * (r[3] * (e * f - d * c) + r[4] * (d * f - a * e) + r[5] * (d * e - b * f))
+    size, single = a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f), a + b + c
+    if abs(x + y + z) > _EQUAL * size:
+        return turned / (x + y + z)
+    total = r[0] + r[1] + r[2]
+    if single == 0.0:
+        return total / 3.0
+    own = (r[0] * a + r[1] * b + r[2] * c + 2.0 * (r[3] * d + r[4] * e + r[5] * f)) / single
+    return 0.5 * (total - own)
