@@ -17,8 +17,8 @@ from vanedamp.coupling.strength.stress import PeriodStress
 
 _VON_MISES, _PRINCIPAL = 6, 7
 #: columns of a period's rows: the time of the piece, a measure and its slopes, a bound of its second derivative, the
-#: product with the largest stress, and a bound of what the piece has
-_AHEAD, _VALUE, _UP, _DOWN, _BENDS, _GOES, _RISE, _COLUMNS = range(8)
+#: product with the largest stress
+_AHEAD, _VALUE, _UP, _DOWN, _BENDS, _GOES, _COLUMNS = range(7)
 #: what a cubic through the ends of a piece may miss of a peak: the square of the second derivative over it, times this
 _BEND = 0.05
 #: of a bound
@@ -222,7 +222,7 @@ def _highest(places, columns, point, value, up, down, n, kind, sign, side):
     goes with that of the largest von Mises stress, -1: against it. Of this largest one itself, side 0, the stress is
     kept in point[2].
     """
-    goes, rise, first = columns[_GOES], columns[_RISE], 0
+    goes, bends, ahead, first = columns[_GOES], columns[_BENDS], columns[_AHEAD], 0
     top = max(_top_row(value, goes, sign, side, n), 0.0)
     if kind == _PRINCIPAL or (kind == _VON_MISES and side == 0.0):
         while value[first] != top and first < n - 1:
@@ -232,17 +232,27 @@ def _highest(places, columns, point, value, up, down, n, kind, sign, side):
             top = _magnitude(point[0])[0]
         else:
             _copy(point[2], point[0])
-    if not _set_rises(value, up, down, columns[_BENDS], goes, columns[_AHEAD], sign, side, top, rise, n) > top:
-        return top
-    first = 0
+    share = _BEND / max(top, _TINY)
+    least = top - (4 / 27) * (_size(up, n) + _size(down, n)) - share * _size(bends, n) ** 2
     for i in range(n - 1):
-        if rise[i] > rise[first]:
-            first = i
-    top = _piece(places, goes, point, first, kind, sign, side, top)
-    for i in range(n - 1):
-        if rise[i] > top and i != first:
+        high = max(sign * value[i], sign * value[i + 1])
+        if high <= least or ahead[i] == 0.0 or (side * goes[i] < 0.0 and side * goes[i + 1] < 0.0):
+            continue
+        a, b, bend = sign * up[i], sign * down[i + 1], max(bends[i], bends[i + 1])
+        # where the slope does not vanish the largest value is that of an end
+        inside = a > 0.0 > b or abs(a) + abs(b) < bend or abs(side) * goes[i] * goes[i + 1] < 0.0
+        if inside and high + (4 / 27) * (max(a, 0.0) + max(-b, 0.0)) + share * bend * bend > top:
             top = _piece(places, goes, point, i, kind, sign, side, top)
     return top
+
+
+@comparing
+def _size(column, n):
+    """Return the largest magnitude in a column."""
+    most = 0.0
+    for i in range(n):
+        most = max(most, abs(column[i]))
+    return most
 
 
 @comparing
@@ -252,25 +262,6 @@ def _top_row(value, goes, sign, side, n):
     for i in range(n):
         top = max(top, sign * value[i] if side * goes[i] >= 0.0 else 0.0)
     return top
-
-
-@comparing
-def _set_rises(value, up, down, bends, goes, ahead, sign, side, top, rise, n):
-    """Set bounds of the largest values of the pieces, 0 for those that have none within them. Return the largest."""
-    most, share = 0.0, _BEND / max(top, _TINY)
-    for i in range(n - 1):
-        a, b = sign * up[i], sign * down[i + 1]
-        bend = max(bends[i], bends[i + 1])
-        found = (
-            max(sign * value[i], sign * value[i + 1]) + (4 / 27) * (max(a, 0.0) + max(-b, 0.0)) + share * bend * bend
-        )
-        with_a, with_b = side * goes[i], side * goes[i + 1]
-        # where the slope does not vanish the largest value is that of an end
-        inside = (a > 0.0) & (b < 0.0) | (abs(a) + abs(b) < bend) | (with_a * with_b < 0.0)
-        found = found if inside & (ahead[i] > 0.0) & ((with_a >= 0.0) | (with_b >= 0.0)) else 0.0
-        rise[i] = found
-        most = max(most, found)
-    return most
 
 
 @kernel

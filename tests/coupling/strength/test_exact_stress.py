@@ -68,7 +68,10 @@ def dense_amplitudes(made, periods, each):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_largest_stresses_are_those_of_dense_samples(file, law):
-    """Samples miss (w h)^2/8 of what moves with w, 1e-6 at most, and a step of what turns round in an impact."""
+    """Samples miss (w h)^2/8 of what moves with w, 1e-6 at most, and a step of what turns round in an impact.
+
+    Their mean is another, by 1e-6, and so are stresses about it.
+    """
     made = scene(file, **LAWS[law] | {"time": {"periods": 30 + PERIODS, "transient": 30}})
     dense, mean = dense_amplitudes(made, PERIODS, DENSE)
     response = simulate(made)
@@ -80,7 +83,7 @@ def test_largest_stresses_are_those_of_dense_samples(file, law):
             found = [*getattr(spot, f"amplitude{suffix}").values()]
             found += [getattr(spot, f"{name}{suffix}") for name in ("von_mises", "principal")]
             missed = (np.array(found) - amplitude) / scale
-            assert missed.min() > -1e-8 and missed.max() < 5e-6, dict(zip(MEASURES, missed, strict=True))
+            assert missed.min() > -1e-7 and missed.max() < 5e-6, dict(zip(MEASURES, missed, strict=True))
         assert spot.mean == pytest.approx(mean[:, place].mean(axis=0), abs=2e-6 * scale)
         assert (spot.samples_per_period, spot.sampling_error) == (0, 0.0)
 
