@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,31 +27,28 @@ class Functionals(NamedTuple):
         return values, self.rows @ Z + turns.transpose(0, 2, 1)
 
 
-class Product(NamedTuple):
-    """The sum of the products of two lists of functionals."""
+class Products(NamedTuple):
+    """Products of two lists of functionals (m,), each of which adds to the sums (r,) that `adds` (r, m) tells."""
 
     left: Functionals
     right: Functionals
+    adds: np.ndarray
 
-    def each(self, z: np.ndarray, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def of(self, z: np.ndarray, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the products (n, m) along a motion, and their derivatives (n, m, P)."""
         (a, of_a), (b, of_b) = self.left.of(z, Z), self.right.of(z, Z)
         return a * b, of_a * b[:, :, None] + a[:, :, None] * of_b
 
-    def of(self, z: np.ndarray, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return its values (n,) along a motion, and derivatives (n, P)."""
-        value, turns = self.each(z, Z)
-        return value.sum(axis=1), turns.sum(axis=1)
+
+def joined(parts: Sequence[Functionals]) -> Functionals:
+    """Return functionals in one list."""
+    rows, own = zip(*parts, strict=True)
+    return Functionals(np.concatenate(rows), np.concatenate(own, axis=1))
 
 
 def response_of(dynamics: Dynamics, numbers: Numbers) -> Functionals:
     """Return the displacement, m."""
     return Functionals(dynamics.response[None], numbers.parts.response[:, None])
-
-
-def each_of(rows: np.ndarray, own: np.ndarray) -> list[Functionals]:
-    """Return functionals (m, K) with derivatives (P, m, K) one by one."""
-    return [Functionals(rows[[k]], own[:, [k]]) for k in range(len(rows))]
 
 
 def slipping(flow: Flow) -> np.ndarray:
@@ -67,23 +65,23 @@ def momentum_of(dynamics: Dynamics, numbers: Numbers) -> Functionals:
     return Functionals(rows, own)
 
 
-def powers_of(flow: Flow, numbers: Numbers) -> list[Product]:
-    """Return the powers of a flow by POWERS, W."""
+def integrands_of(flow: Flow, numbers: Numbers) -> Products:
+    """Return what sums of a motion in a flow integrate: x^2, m^2, and the powers by POWERS, W."""
     dynamics, of, moved = flow.dynamics, numbers.parts, derivative_of(flow, numbers)
     system, u, K = dynamics.system, len(flow.state), len(dynamics.turn)
     speeds = Functionals(np.eye(K)[dynamics.rates], np.zeros((len(numbers), len(dynamics.root), K)))
     harmonics, damped = np.zeros(K), np.zeros(K)
     harmonics[dynamics.one + 1 :], damped[dynamics.rates] = 1.0, -1.0
-    presses = np.zeros(u, bool)
-    presses[flow.solved.pressed] = True
-    dashpot, of_dashpot = np.where(presses, system.dashpot, 0.0), np.where(presses, of.dashpot, 0.0)
-    slips = slipping(flow)
-    slip = Functionals(dynamics.speed[u:][slips], of.speed[:, u:][:, slips])
-    gap = Functionals(dynamics.speed[:u], of.speed[:, :u])
-    lost = dashpot[:, None] * gap.rows, of_dashpot[:, :, None] * gap.rows + dashpot[:, None] * gap.own
-    return [
-        Product(Functionals(dynamics.load * harmonics, of.load * harmonics), speeds),
-        Product(Functionals(dynamics.load * damped, of.load * damped), speeds),
-        Product(Functionals(-flow.forces[u:][slips], -moved.forces[:, u:][:, slips]), slip),
-        Product(Functionals(*lost), gap),
-    ]
+    n, slips, x = flow.solved.pressed, u + slipping(flow), response_of(dynamics, numbers)
+    gap, of_dashpot = Functionals(dynamics.speed[n], of.speed[:, n]), of.dashpot[:, n, None]
+    dashpot = system.dashpot[n, None]
+    left = (
+        x,
+        Functionals(dynamics.load * harmonics, of.load * harmonics),
+        Functionals(dynamics.load * damped, of.load * damped),
+        Functionals(-flow.forces[slips], -moved.forces[:, slips]),
+        Functionals(dashpot * gap.rows, of_dashpot * gap.rows + dashpot * gap.own),
+    )
+    right = x, speeds, speeds, Functionals(dynamics.speed[slips], of.speed[:, slips]), gap
+    own = np.repeat(np.arange(len(left)), [len(each.rows) for each in left])
+    return Products(joined(left), joined(right), 1.0 * (own == np.arange(len(left))[:, None]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import null_space
@@ -19,10 +19,10 @@ from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.sensitivity.integrands import (
     POWERS,
     Functionals,
-    Product,
-    each_of,
+    Products,
+    integrands_of,
+    joined,
     momentum_of,
-    powers_of,
     response_of,
     slipping,
 )
@@ -30,7 +30,7 @@ from vanedamp.coupling.sensitivity.peaks import Swing
 from vanedamp.coupling.sensitivity.sensitivity_record import Impact
 from vanedamp.coupling.sensitivity.strength import Struck
 from vanedamp.coupling.sensitivity.wear import Wearing
-from vanedamp.coupling.system.system import FLOOR, System
+from vanedamp.coupling.system.system import FLOOR
 from vanedamp.coupling.system.unit_laws import SINGULAR
 from vanedamp.coupling.tangents.dual import Dual, zeros
 
@@ -54,17 +54,23 @@ class Measures:
     ) -> None:  # fmt: skip
         self.dynamics, self.numbers, self.first, self.orders = dynamics, numbers, first, tuple(orders)
         self._k, self._P = len(dynamics.scale), len(numbers)
-        self._momentum, response, of = momentum_of(dynamics, numbers), response_of(dynamics, numbers), numbers.parts
-        self._sampled, self._square = sampled or response, Product(response, response)
+        response, of = response_of(dynamics, numbers), numbers.parts
         scene, self._deflected = dynamics.frame.scene, deflects(dynamics.frame.scene, dynamics.system)
         #: (P,) whether numbers bring a static load where there is none: distances count from the mean then
-        self.begins = np.array([not self._deflected and deflects(scene, one) for one in _loaded(dynamics, numbers)])
+        self.begins = np.array([not self._deflected and _begin(dynamics, one) for one in _loads(dynamics, numbers)])
+        outputs, tilts = (
+            [Functionals(rows[[k]], own[:, [k]]) for k in range(len(rows))]
+            for rows, own in ((dynamics.outputs, of.outputs), (dynamics.tilts, of.tilts))
+        )
+        #: what is seen of the whole motion: momentum, and what swings
+        self._sampled = sampled or response
+        self._seen = joined([momentum_of(dynamics, numbers), response, *outputs, *tilts])
         self.response = Swing(response, self._deflected)
-        self.outputs = [Swing(one, self._deflected) for one in each_of(dynamics.outputs, of.outputs)]
-        self.tilts = [Swing(one, False) for one in each_of(dynamics.tilts, of.tilts)]
+        self.outputs = [Swing(one, self._deflected) for one in outputs]
+        self.tilts = [Swing(one, False) for one in tilts]
         self.wear = Wearing(dynamics, numbers) if scene.wear is not None else None
         self.contacts = Struck(dynamics, numbers) if Struck.wanted(scene) else None
-        self._powers: dict[Flow, list[Product]] = {}
+        self._integrands: dict[Flow, Products] = {}
         n = 1 + len(POWERS)
         #: integrals of x^2 and of powers; of momentum and of x with harmonics
         self.sums, self.waves = zeros(n, self._P), zeros(1 + len(self.orders), self._P, complex)
@@ -122,7 +128,8 @@ class Measures:
             return
         floor = self.dynamics.system.surface == FLOOR
         stands = floor & (segment.state != codes.OPEN) & (segment.state != codes.LEAVING)
-        up = np.setdiff1d(np.arange(len(self.lifted.value)), self.dynamics.system.body[stands])
+        up = np.ones(len(self.lifted.value), bool)
+        up[self.dynamics.system.body[stands]] = False
         self.lifted.value[up] += whole
         self.lifted.turns[up] += shift - self._since
 
@@ -132,12 +139,34 @@ class Measures:
     ) -> None:  # fmt: skip
         """Take a piece of a segment. end: z (K,), Z (K, P) there; moves: (P,) of its start and end in time."""
         segment, series = begun.segment, derivative_of(begun.flow, self.numbers).series
-        ends = (begun.z, Z, moves[0]), (*end, moves[1])
-        self.response.passed(segment.period, series, course, segment.duration, ends)
-        if segment.period >= self.first:
-            for swing in (*self.outputs, *self.tilts):
-                swing.passed(segment.period - self.first, series, course, segment.duration, ends)
-            self._integrate(begun, Z, course, end, moves)
+        z = np.vstack([begun.z, course.z, end[0]])
+        at = np.concatenate([Z[None], course.Z, end[1][None]])
+        x, turns = self._seen.of(z, at)
+        rates, counts = z[[0, -1]] @ begun.flow.X.T @ self._seen.rows.T, segment.period >= self.first
+        ends = turns[[0, -1]] + rates[:, :, None] * np.reshape(moves, (2, 1, -1))
+        period = segment.period
+        for row, swing in enumerate((self.response, *(self.outputs + self.tilts if counts else ())), 1):
+            both = zip(x[[0, -1], row].tolist(), ends[:, row], rates[:, row].tolist(), strict=True)
+            swing.passed(period, series, course, segment.duration, (begun.z, Z), x[1:-1, row], both)
+            period = segment.period - self.first
+        if not counts:
+            return
+        # of the ends only the value counts, times how they move
+        weight = np.concatenate([[0.0], course.weight, [0.0]])
+        edges = np.zeros((len(weight), self._P))
+        edges[0], edges[-1] = -moves[0], moves[1]
+        self._integrate(begun.flow, z, at, weight, edges)
+        time = segment.start + np.concatenate([[0.0], course.time, [segment.duration]])
+        self._add_waves(time, x, turns, weight, edges)
+        for row, swing in enumerate((self.response, *self.outputs) if self._deflected else (), 1):
+            swing.integral = swing.integral + Dual(weight @ x[:, row], weight @ turns[:, row] + x[:, row] @ edges)
+        if not self.ends:
+            begins = ends[0, 0]
+            if segment.start == 0.0:
+                unheld = np.vstack([self._unheld, Z[len(self._unheld) :]])
+                begins = begins + self._seen.rows[0] @ (unheld - Z)
+            self.ends.append(Dual(x[0, 0], begins))
+        self.ends[1:] = [Dual(x[-1, 0], ends[1, 0])]
 
     def _whole(self, M: np.ndarray, time: float) -> np.ndarray:
         """Return the derivatives (K, P) of z at a time since the start, s."""
@@ -145,48 +174,33 @@ class Measures:
         Z[: self.dynamics.one] = M[:, self._k :]
         return Z
 
-    def _integrate(
-        self, begun: Before, Z: np.ndarray, course: Course, end: tuple[np.ndarray, np.ndarray],
-        moves: tuple[np.ndarray, np.ndarray],
-    ) -> None:  # fmt: skip
-        segment, flow = begun.segment, begun.flow
-        if flow not in self._powers:
-            if len(self._powers) > _KEPT:
-                self._powers.clear()
-            self._powers[flow] = powers_of(flow, self.numbers)
-        z = np.vstack([begun.z, course.z, end[0]])
-        at = np.concatenate([Z[None], course.Z, end[1][None]])
-        # of the ends only the value counts, times how they move
-        weight = np.concatenate([[0.0], course.weight, [0.0]])
-        edges = np.zeros((len(weight), self._P))
-        edges[0], edges[-1] = -moves[0], moves[1]
-        for row, product in enumerate([self._square, *self._powers[flow]]):
-            value, turns = product.each(z, at)
-            each = weight @ value, np.tensordot(weight, turns, 1) + value.T @ edges
-            self.sums.value[row] += each[0].sum()
-            self.sums.turns[row] += each[1].sum(axis=0)
-            if self.wear is not None and row == 1 + POWERS.index("friction"):
-                self.wear.friction.value[slipping(flow)] += each[0]
-                self.wear.friction.turns[slipping(flow)] += each[1]
-        time = segment.start + np.concatenate([[0.0], course.time, [segment.duration]])
-        for row, (order, functional) in enumerate(
-            [(1, self._momentum), *((order, self.response.functional) for order in self.orders)]
-        ):
-            value, turns = functional.of(z, at)
-            wave = np.exp(-1j * order * self.dynamics.system.omega * time)
-            turning = -1j * order * np.multiply.outer(time, self.omega.turns)
-            whole = (turns[:, 0] + value * turning) * wave[:, None]
-            self.waves.value[row] += weight @ (value[:, 0] * wave)
-            self.waves.turns[row] += weight @ whole + (value[:, 0] * wave) @ edges
-        if self._deflected:
-            for swing in (self.response, *self.outputs):
-                swing.integrate(weight, edges, z, at)
-        if segment.start == 0.0:
-            Z = np.vstack([self._unheld, Z[len(self._unheld) :]])
-        for instant, turned, moved in ((begun.z, Z, moves[0]), (*end, moves[1])):
-            value, turns = self._momentum.of(instant[None], turned[None])
-            drift = self._momentum.rows @ flow.X @ instant
-            self.ends = [*self.ends[:1], Dual(value[0, 0], turns[0, 0] + drift[0] * moved)]
+    def _integrate(self, flow: Flow, z: np.ndarray, at: np.ndarray, weight: np.ndarray, edges: np.ndarray) -> None:
+        """Add the integrals of x^2 and of powers. edges: (n, P) by how much of the values at nodes the ends move."""
+        if flow not in self._integrands:
+            if len(self._integrands) > _KEPT:
+                self._integrands.clear()
+            self._integrands[flow] = integrands_of(flow, self.numbers)
+        products = self._integrands[flow]
+        value, turns = products.of(z, at)
+        each = weight @ value, np.tensordot(weight, turns, 1) + value.T @ edges
+        self.sums.value += products.adds @ each[0]
+        self.sums.turns += products.adds @ each[1]
+        if self.wear is not None:
+            rubs = products.adds[1 + POWERS.index("friction")] > 0.0
+            self.wear.friction.value[slipping(flow)] += each[0][rubs]
+            self.wear.friction.turns[slipping(flow)] += each[1][rubs]
+
+    def _add_waves(
+        self, time: np.ndarray, x: np.ndarray, turns: np.ndarray, weight: np.ndarray, edges: np.ndarray
+    ) -> None:
+        """Add the integrals of momentum and of x with harmonics: of their values x (n, m), turns (n, m, P)."""
+        rows = [0, *(1 for _ in self.orders)]
+        angle = -1j * np.multiply.outer(time, (1, *self.orders))
+        wave = np.exp(angle * self.dynamics.system.omega)
+        value = x[:, rows] * wave
+        whole = turns[:, rows] * wave[:, :, None] + (value * angle)[:, :, None] * self.omega.turns
+        self.waves.value += weight @ value
+        self.waves.turns += np.tensordot(weight, whole, 1) + value.T @ edges
 
     @property
     def omega(self) -> Dual:
@@ -290,9 +304,12 @@ class Measures:
         return {name: self.sums[1 + row] for row, name in enumerate(POWERS)} | {"impact": self.lost[0]}
 
 
-def _loaded(dynamics: Dynamics, numbers: Numbers) -> Iterator[System]:
-    """Yield the system with what each number adds to the static loads, in place of these."""
+def _loads(dynamics: Dynamics, numbers: Numbers) -> np.ndarray:
+    """Return what each number adds to the static loads (P, N)."""
     of, one = numbers.parts, dynamics.one
-    for load, root in zip(of.load[:, :, one], of.root, strict=True):
-        weight = dynamics.size * (load * dynamics.root + dynamics.load[:, one] * root)
-        yield dynamics.system._replace(weight=weight)
+    return np.asarray(dynamics.size * (of.load[:, :, one] * dynamics.root + dynamics.load[:, one] * of.root))
+
+
+def _begin(dynamics: Dynamics, weight: np.ndarray) -> bool:
+    """Return whether static loads (N,) move the response."""
+    return bool(weight.any()) and deflects(dynamics.frame.scene, dynamics.system._replace(weight=weight))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -60,14 +60,13 @@ class Swing:
         self.integral = Dual(0.0, np.zeros(self._number))
 
     def passed(
-        self, period: int, series: Series, course: Course, duration: float,
-        ends: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
+        self, period: int, series: Series, course: Course, duration: float, begun: tuple[np.ndarray, np.ndarray],
+        x: np.ndarray, ends: Iterable[tuple[float, np.ndarray, float]],
     ) -> None:  # fmt: skip
-        """Take the values of a segment. ends: z (K,), Z (K, P) and how its time moves (P,), s, at start and end."""
+        """Take the values x (n,) of a course. begun: z (K,) and Z (K, P); ends: value, derivatives (P,), and rate."""
         while len(self.found) <= period:
             self.found.append(([], []))
-        (z, Z, _), row = ends[0], self.functional.rows[0]
-        begins, stops = (self._end(series, *each) for each in ends)
+        (begins, stops), row = ends, self.functional.rows[0]
         for sign, found in zip((1.0, -1.0), self.found[period], strict=True):
             start, end = (
                 Height(sign * value, sign * turns, way * sign * rate >= 0.0)
@@ -77,26 +76,14 @@ class Swing:
                 start = start._replace(summit=start.summit and found[-1].summit)
                 found[-1] = found[-1]._replace(summit=start.summit)
             found += [start, end]
-        x = course.z @ row
         size = np.ptp(x) if self.deflected else np.abs(x).max(initial=0.0)
         for sign, found in zip((1.0, -1.0), self.found[period], strict=True):
             others = found if self.deflected else [*self.found[period][0], *self.found[period][1]]
             least = max((each.value for each in others), default=-np.inf) - _NEAR * size
-            for at in _summits(sign * row, series, course, duration, least):
-                there = series.course(z, Z, at, False)
+            for at in _summits(sign * row, series, course, sign * x, duration, least):
+                there = series.course(*begun, at, False)
                 value, turns = self.functional.of(there.last[None], there.end[None])
                 found.insert(-1, Height(sign * float(value[0, 0]), sign * turns[0, 0], True))
-
-    def _end(self, series: Series, z: np.ndarray, Z: np.ndarray, moves: np.ndarray) -> tuple[float, np.ndarray, float]:
-        """Return the value at an end of a segment, its derivatives (P,), and its rate. Arguments as in `passed`."""
-        value, turns = self.functional.of(z[None], Z[None])
-        rate = float(self.functional.rows[0] @ series.X @ z)
-        return float(value[0, 0]), turns[0, 0] + rate * moves, rate
-
-    def integrate(self, weight: np.ndarray, edges: np.ndarray, z: np.ndarray, Z: np.ndarray) -> None:
-        """Take the integral over a segment: see Measures._integrate."""
-        value, turns = self.functional.of(z, Z)
-        self.integral = self.integral + Dual(weight @ value[:, 0], weight @ turns[:, 0] + value[:, 0] @ edges)
 
     def distances(self, mean: Dual, first: int = 0) -> tuple[Dual, bool]:
         """Return the largest distances (n,) from a value in periods from `first` on, and whether there are kinks."""
@@ -118,9 +105,10 @@ def joined(parts: Iterable[Dual], number: int) -> Dual:
     return Dual([one.value for one in each], np.reshape([one.turns for one in each], (-1, number)))
 
 
-def _summits(row: np.ndarray, series: Series, course: Course, duration: float, least: float) -> list[float]:
-    """Return the times of the summits of a functional row (K,) within a segment, near nodes above a value, s."""
-    x = course.z @ row
+def _summits(
+    row: np.ndarray, series: Series, course: Course, x: np.ndarray, duration: float, least: float
+) -> list[float]:
+    """Return the times of the summits of a functional row (K,) within a segment, near nodes x (n,) above a value, s."""
     inner = np.flatnonzero((x[1:-1] >= x[:-2]) & (x[1:-1] >= x[2:])) + 1
     least = max(least, x.max() - _NEAR * np.ptp(x))
     near = [node for node in (*inner.tolist(), 0, len(x) - 1) if x[node] >= least]
