@@ -10,17 +10,17 @@ import cmath
 import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
 
 from vanedamp.coupling.tangents.differences import NotSmooth
 
-#: derivatives of functions by each of their arguments
+#: derivatives of functions by each of their arguments; None: 1
 _SLOPES: dict[np.ufunc, Callable[..., tuple[Any, ...]]] = {
-    np.add: lambda a, b: (1.0, 1.0),
-    np.subtract: lambda a, b: (1.0, -1.0),
+    np.add: lambda a, b: (None, None),
+    np.subtract: lambda a, b: (None, -1.0),
     np.multiply: lambda a, b: (b, a),
     np.true_divide: lambda a, b: (1.0 / b, -a / b / b),
     np.power: lambda a, b: (b * a ** (b - 1.0), a**b * np.log(a)),
@@ -32,11 +32,9 @@ _SLOPES: dict[np.ufunc, Callable[..., tuple[Any, ...]]] = {
     np.arctan2: lambda y, x: (x / (x * x + y * y), -y / (x * x + y * y)),
 }
 #: functions that act on values and derivatives alike; those of values alone; and those that compare
-_LINEAR, _OF_VALUES = (np.conjugate, np.positive), (np.isfinite, np.isinf, np.isnan, np.sign, np.rint)
-_COMPARE = (np.greater, np.greater_equal, np.less, np.less_equal, np.equal, np.not_equal)
-
-
-_SILENT = nullcontext()
+_LINEAR, _OF_VALUES = {np.conjugate, np.positive}, {np.isfinite, np.isinf, np.isnan, np.sign, np.rint}
+_COMPARE = {np.greater, np.greater_equal, np.less, np.less_equal, np.equal, np.not_equal}
+_PLAIN, _DECIDE = _OF_VALUES | _COMPARE, _COMPARE | {np.maximum, np.minimum}
 
 
 class _Active(threading.local):
@@ -51,15 +49,10 @@ def numbers(count: int | None) -> Iterator[None]:
     """Let `zeros` and `array` make numbers with derivatives by `count` numbers; None: plain ones."""
     before, _ACTIVE.count = _ACTIVE.count, count
     try:
-        with _quiet(count is None):
+        with nullcontext() if count is None else np.errstate(all="ignore"):  # nan is what is not known
             yield
     finally:
         _ACTIVE.count = before
-
-
-def _quiet(already: bool) -> AbstractContextManager[None]:
-    """Let numpy be silent, unless it is already: nan is what is not known."""
-    return _SILENT if already else np.errstate(all="ignore")
 
 
 class Dual(np.lib.mixins.NDArrayOperatorsMixin):
@@ -86,8 +79,7 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
         out = options.pop("out", None)
         if method != "__call__" or options:
             return NotImplemented
-        with _quiet(_ACTIVE.count is not None):
-            found = _called(ufunc, inputs, self.turns.shape[-1])
+        found = _called(ufunc, *inputs)
         if out is None or found is NotImplemented:
             return found
         out[0][...] = found
@@ -164,18 +156,25 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
         return ((self.value != 0) | (self.turns != 0).any(axis=-1)).any(*options, **more)
 
 
-def _called(ufunc: np.ufunc, inputs: tuple[Any, ...], count: int) -> Any:
+for _name, _ufunc in zip(
+    ("add", "sub", "mul", "truediv", "matmul"),
+    (np.add, np.subtract, np.multiply, np.true_divide, np.matmul),
+    strict=True,
+):
+    # straight to their derivatives: the way through numpy takes as long as these
+    setattr(Dual, f"__{_name}__", lambda one, other, of=_ufunc: _called(of, one, other))
+    setattr(Dual, f"__r{_name}__", lambda one, other, of=_ufunc: _called(of, other, one))
+
+
+def _called(ufunc: np.ufunc, *inputs: Any) -> Any:
     """Return a function of numbers, some of which have derivatives."""
-    if ufunc.__name__ == "matmul":
+    if ufunc is np.matmul:
         return _product(*inputs)
-    plain = [values(one) for one in inputs]
+    plain = [one.value if isinstance(one, Dual) else one for one in inputs]
     value = ufunc(*plain)
-    if ufunc in _COMPARE or ufunc in (np.maximum, np.minimum):
-        if _ACTIVE.count is not None:
-            _check_apart(*inputs)
-        if ufunc in _COMPARE:
-            return value
-    if ufunc in _OF_VALUES:
+    if ufunc in _DECIDE and _ACTIVE.count is not None:
+        _check_apart(*inputs)
+    if ufunc in _PLAIN:
         return value
     if ufunc in _LINEAR:
         return Dual(value, ufunc(inputs[0].turns))
@@ -183,12 +182,13 @@ def _called(ufunc: np.ufunc, inputs: tuple[Any, ...], count: int) -> Any:
         return Dual(value, _of_size(inputs[0], value))
     if ufunc not in _SLOPES:
         return NotImplemented
-    turns: Any = 0.0
+    turns: Any = None
     for one, slope in zip(inputs, _SLOPES[ufunc](*plain), strict=True):
         if isinstance(one, Dual):
-            turns = turns + np.asarray(slope)[..., None] * one.turns
-    shape = (*np.shape(value), count)
-    return Dual(value, turns if np.shape(turns) == shape else np.broadcast_to(turns, shape).copy())
+            own = one.turns if slope is None else np.asarray(slope)[..., None] * one.turns
+            turns = own if turns is None else turns + own
+    shape = (*np.shape(value), turns.shape[-1])
+    return Dual(value, turns if turns.shape == shape else np.broadcast_to(turns, shape).copy())
 
 
 def _of_size(one: Dual, size: Any) -> Any:
@@ -212,12 +212,10 @@ def _product(one: Any, other: Any) -> Dual:
     a, b = values(one), values(other)
     turns: Any = 0.0
     if isinstance(one, Dual):
-        turns = np.moveaxis(np.matmul(np.moveaxis(one.turns, -1, 0), b), 0, -1)
+        turns = one.turns.swapaxes(-1, -2) @ b
+        turns = turns if b.ndim == 1 else turns.swapaxes(-1, -2)
     if isinstance(other, Dual):
-        if b.ndim == 1:
-            turns = turns + np.matmul(a, other.turns)
-        else:
-            turns = turns + np.moveaxis(np.matmul(a, np.moveaxis(other.turns, -1, 0)), 0, -1)
+        turns = turns + (a @ other.turns.reshape(len(b), -1)).reshape(*a.shape[:-1], *other.turns.shape[1:])
     return Dual(np.matmul(a, b), turns)
 
 
