@@ -80,7 +80,7 @@ def _measured(effort: Sensitivity, name: str) -> dict[str, Any]:
         begun = simulate(scene.replace({"time.periods": effort.settle})).final
         assert begun is not None and len(numbers) == 10
         alone = period_map(scene)
-        state, mapped = alone.state_of(begun), replace(alone, numbers=numbers, _earlier=[])
+        state, mapped = alone.state_of(begun), replace(alone, numbers=numbers, earlier=[])
         set_up = seconds(lambda: mapped._numbers)
         ways = {_ALONE: partial(alone, state, False), _OWN: partial(alone, state), _NUMBERS: partial(mapped, state)}
         clocks = {name: partial(_clock, way, effort.passages) for name, way in ways.items()}

@@ -154,7 +154,7 @@ def _turned(
 
     Beside it, what moves its reduced model: structures of the scene that moves, and by how much (modal_basis.moved).
     """
-    sizes, moves, given = np.zeros(len(paths)), list[Any](), dict[str, Dual]()
+    sizes, moves, given, data = np.zeros(len(paths)), list[Any](), dict[str, Dual](), scene.to_dict()
     for place, path in enumerate(paths):
         own = np.eye(len(paths))[place]
         if isinstance(path, MatrixDirection):
@@ -163,7 +163,7 @@ def _turned(
                 (lambda amount, path=path: derived(path.at(scene, amount)).structure, Dual(0.0, sizes[place] * own))
             )
             continue
-        value = number_of_motion(scene, path, "numbers")
+        value = number_of_motion(scene, path, "numbers", data=data)
         sizes[place] = abs(value) or _size(path, dynamics)
         if path.startswith("structure.") and isinstance(scene.structure, Rom):
             moves.append((
@@ -174,18 +174,20 @@ def _turned(
             given[path].turns[:] += sizes[place] * own
         else:
             given[path] = Dual(value, sizes[place] * own)
-    return with_numbers(scene, scene.to_dict(), given), moves, sizes
+    return with_numbers(scene, data, given), moves, sizes
 
 
-def number_of_motion(scene: Scene, path: str, key: str, others: Sequence[str] = ()) -> float:
+def number_of_motion(
+    scene: Scene, path: str, key: str, others: Sequence[str] = (), data: dict[str, Any] | None = None
+) -> float:
     """Return a number of a scene that enters its motion. Raises InputError for another one.
 
-    key: that names it; others: tables whose numbers do not count either.
+    key: that names it; others: tables whose numbers do not count either; data: the scene's plain data, where known.
     """
     if path.split(".")[0] in (*_NO_NUMBERS, *others):
         raise InputError(f"{key}: {path} is no number of the motion's equations; take one such as {FREQUENCY}")
     try:
-        return scene.number(path)
+        return scene.number(path, data)
     except InputError as error:
         raise InputError(f"{key}: {str(error).removeprefix('scene: ')}") from None
 

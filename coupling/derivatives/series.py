@@ -89,9 +89,9 @@ class Series:
         z, Z = np.array(z), np.array(Z)
         room = np.empty((TERMS, k)), np.empty((TERMS, k, p))
         _advance(*self._X, *self._D, p - self._numbers, z, Z, step, panels, places, *room, of_z, of_Z)
-        time = (np.arange(panels)[:, None] + places) * step
-        weight = np.tile(_WEIGHTS if nodes else places, panels) * step
-        return Course(time.ravel(), weight, of_z, of_Z, z, Z)
+        time = ((np.arange(panels)[:, None] + places) * step).ravel()
+        weight = np.resize(_WEIGHTS * step, len(time)) if nodes else time
+        return Course(time, weight, of_z, of_Z, z, Z)
 
 
 @entry

@@ -65,7 +65,7 @@ class OtherSide:
         apart = np.diff([*times, times[0] + length])
         later = float(times[int(apart.argmax())] + 0.5 * apart.max()) % length
         begin = (self.problem.map.begin + later) % min(length, 1.0)
-        there = replace(self.problem, map=replace(self.problem.map, begin=begin, _earlier=[]), _maps={}, _passages={})
+        there = replace(self.problem, map=replace(self.problem.map, begin=begin, earlier=[]), _maps={}, _passages={})
         head = _moved(last, there, later)
         if head is None:
             return None

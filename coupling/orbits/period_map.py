@@ -65,7 +65,7 @@ class PeriodMap:
     begin: float = 0.0
     made: Callable[[Scene], Scene] = lambda given: given
     #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
-    _earlier: list[EventRun] = field(default_factory=list, repr=False)
+    earlier: list[EventRun] = field(default_factory=list, repr=False)
 
     @cached_property
     def scene(self) -> Scene:
@@ -117,8 +117,8 @@ class PeriodMap:
         self, state: np.ndarray, periods: int, derivative: bool, part: float = np.inf, short: bool = False
     ) -> tuple[Passage, tuple[np.ndarray, np.ndarray, np.ndarray] | None]:
         """Return a passage from a state (k,), and state and derivatives at a part of a period; short: it ends there."""
-        run = run_from(self._frame, state, periods, *self._earlier)
-        self._earlier[:] = [run]
+        run = run_from(self._frame, state, periods, *self.earlier)
+        self.earlier[:] = [run]
         numbers = self._numbers if derivative else None
         walk = PassageWalk(self.dynamics, self._event_names, state, derivative, numbers, part=part, short=short)
         return walk.passage(run, periods), walk.reached
@@ -165,7 +165,7 @@ class PeriodMap:
         begin, there, symmetry = self.begin + periods, reached[0], self.travelling if self.wave else None
         if symmetry is not None and begin > symmetry.part - _AT_END:
             begin, there = begin - symmetry.part, symmetry.image @ there
-        return replace(self, begin=begin % 1.0, _earlier=[]), there
+        return replace(self, begin=begin % 1.0, earlier=[]), there
 
     def run(self, state: np.ndarray, events: bool = False, samples_per_period: int = 0) -> Response:
         """Return the run over the map's periods from a state (k,), arguments as in coupling.simulation.simulate."""

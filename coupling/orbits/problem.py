@@ -112,7 +112,7 @@ class Problem:
     def amplitude(self, y: np.ndarray, passage: Passage) -> float:
         """Return the mean over whole periods of the largest displacement, m; a passage of a wave has a part of one."""
         if self.map.wave:
-            passage = replace(self.at(y), wave=False, _earlier=[])(self.state(y), False)
+            passage = replace(self.at(y), wave=False, earlier=[])(self.state(y), False)
         return float(passage.peaks.mean())
 
     def by_state(self, passage: Passage) -> np.ndarray:

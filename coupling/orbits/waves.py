@@ -29,7 +29,7 @@ def of_waves(period_map: PeriodMap) -> PeriodMap:
             "orbit.wave: a wave travels over equal sectors with bodies in equal steps (cavities such as c@0, c@1), "
             "without mistuning or scatter, under one engine order that is no multiple of their number; over one period"
         )
-    return replace(period_map, wave=True, _earlier=[])
+    return replace(period_map, wave=True, earlier=[])
 
 
 def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
@@ -52,7 +52,7 @@ def find_wave(period_map: PeriodMap, start: np.ndarray) -> Orbit:
 def whole(wave: Orbit) -> Orbit:
     """Return an orbit of a map of waves as one over the whole period, whose derivative is the product of the parts'."""
     assert wave.map is not None and wave.map.travelling is not None
-    symmetry, period_map = wave.map.travelling, replace(wave.map, wave=False, _earlier=[])
+    symmetry, period_map = wave.map.travelling, replace(wave.map, wave=False, earlier=[])
     passage, own = period_map(wave.state, derivative=False), wave.passage
     missed = float(np.abs((passage.state - wave.state) / wave.scale).max(initial=0.0))
     # (image part)^times is the whole period, with the sectors shifted all the way round or by a period of the loads

@@ -607,9 +607,12 @@ class Scene(OpenRecord, Displayed):
         """Return plain nested data as in the file, without values that are None."""
         return tables(self)
 
-    def number(self, path: str) -> float:
-        """Return the number at a dotted path, of positions where the bodies begin. Raises InputError for none."""
-        data = self.to_dict()
+    def number(self, path: str, data: dict[str, Any] | None = None) -> float:
+        """Return the number at a dotted path, of positions where the bodies begin. Raises InputError for none.
+
+        data: its plain data, where they are known: positions are set there.
+        """
+        data = self.to_dict() if data is None else data
         for body, place in zip(data.get("damper", ()), self.positions, strict=True):
             body["position"] = place
         return number_at(data, path)

@@ -54,10 +54,13 @@ class Measures:
     ) -> None:  # fmt: skip
         self.dynamics, self.numbers, self.first, self.orders = dynamics, numbers, first, tuple(orders)
         self._k, self._P = len(dynamics.scale), len(numbers)
-        response, of = response_of(dynamics, numbers), numbers.parts
+        response, of, one = response_of(dynamics, numbers), numbers.parts, dynamics.one
         scene, self._deflected = dynamics.frame.scene, deflects(dynamics.frame.scene, dynamics.system)
         #: (P,) whether numbers bring a static load where there is none: distances count from the mean then
-        self.begins = np.array([not self._deflected and _begin(dynamics, one) for one in _loads(dynamics, numbers)])
+        self.begins = np.array([
+            not self._deflected and load.any() and deflects(scene, dynamics.system._replace(weight=load))
+            for load in dynamics.size * (of.load[:, :, one] * dynamics.root + dynamics.load[:, one] * of.root)
+        ], bool)  # fmt: skip
         outputs, tilts = (
             [Functionals(rows[[k]], own[:, [k]]) for k in range(len(rows))]
             for rows, own in ((dynamics.outputs, of.outputs), (dynamics.tilts, of.tilts))
@@ -144,11 +147,10 @@ class Measures:
         x, turns = self._seen.of(z, at)
         rates, counts = z[[0, -1]] @ begun.flow.X.T @ self._seen.rows.T, segment.period >= self.first
         ends = turns[[0, -1]] + rates[:, :, None] * np.reshape(moves, (2, 1, -1))
-        period = segment.period
         for row, swing in enumerate((self.response, *(self.outputs + self.tilts if counts else ())), 1):
             both = zip(x[[0, -1], row].tolist(), ends[:, row], rates[:, row].tolist(), strict=True)
+            period = segment.period - (self.first if row > 1 else 0)
             swing.passed(period, series, course, segment.duration, (begun.z, Z), x[1:-1, row], both)
-            period = segment.period - self.first
         if not counts:
             return
         # of the ends only the value counts, times how they move
@@ -266,10 +268,12 @@ class Measures:
     def _let_go(self, before: Before, after: Flow, shift: np.ndarray) -> None:
         """Take the energy of springs whose force ends, or begins, while they are pressed: it is lost with contact."""
         dynamics, of = self.dynamics, self.numbers.parts
-        own, new = before.flow.solved.pressed, after.solved.pressed
+        own, new = set(before.flow.solved.pressed.tolist()), set(after.solved.pressed.tolist())
+        if own == new:
+            return
         Z = self._whole(before.M, before.segment.start + before.segment.duration)
         row = 1 + POWERS.index("contact")
-        for r in np.setxor1d(own, new).tolist():
+        for r in sorted(own ^ new):
             way, spring = (1.0 if r in own else -1.0), float(dynamics.system.spring[r])
             gap, rate = float(dynamics.gap[r] @ before.z), float(dynamics.gap[r] @ before.flow.X @ before.z)
             turned = dynamics.gap[r] @ Z + of.gap[:, r] @ before.z + rate * shift
@@ -302,14 +306,3 @@ class Measures:
     def energies(self) -> dict[str, Dual]:
         """Return the work of the excitation and the losses over the periods that count, J."""
         return {name: self.sums[1 + row] for row, name in enumerate(POWERS)} | {"impact": self.lost[0]}
-
-
-def _loads(dynamics: Dynamics, numbers: Numbers) -> np.ndarray:
-    """Return what each number adds to the static loads (P, N)."""
-    of, one = numbers.parts, dynamics.one
-    return np.asarray(dynamics.size * (of.load[:, :, one] * dynamics.root + dynamics.load[:, one] * of.root))
-
-
-def _begin(dynamics: Dynamics, weight: np.ndarray) -> bool:
-    """Return whether static loads (N,) move the response."""
-    return bool(weight.any()) and deflects(dynamics.frame.scene, dynamics.system._replace(weight=weight))

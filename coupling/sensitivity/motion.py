@@ -16,6 +16,7 @@ from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.derivatives.numbers import Numbers, StartOf, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
+from vanedamp.coupling.response.segment import EventRun
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.figures import Figures
 from vanedamp.coupling.sensitivity.measures import Measures
@@ -54,14 +55,16 @@ class Motion:
     """A motion of a scene from a state (k,), to be passed with its derivatives.
 
     derived: the scene that runs, from the one with the numbers; begins: the state of the start from both
-    (numbers.StartOf); speed: as in Frame; dynamics: of the scene that runs, where they are known. Raises InputError,
-    and NotSmooth.
+    (numbers.StartOf); speed: as in Frame; dynamics: of the scene that runs, where they are known; earlier: runs of
+    which the first passage takes the last over (walk.run_from). Raises InputError, and NotSmooth.
     """
 
     def __init__(
         self, scene: Scene, paths: Paths, derived: Callable[[Scene], Scene] = lambda scene: scene,
         begins: StartOf | None = None, speed: float | None = None, dynamics: Dynamics | None = None,
+        earlier: Sequence[EventRun] = (),
     ) -> None:  # fmt: skip
+        self._earlier = earlier
         self.frame = Frame(derived(scene), speed) if dynamics is None else dynamics.frame
         self.scene, self.completed = self.frame.scene, False
         if dynamics is None:
@@ -88,7 +91,7 @@ class Motion:
         names, turned = EventNames(self.scene, self.frame.system), turns * self.numbers.size
         short = part < periods
         walk = PassageWalk(self.dynamics, names, state, True, self.numbers, turned, watch, given, part, short)
-        run = run_from(self.frame, state, periods)
+        run, self._earlier = run_from(self.frame, state, periods, *self._earlier), ()
         if watch is not None:
             watch.run = run
         passage = walk.passage(run, periods)

@@ -119,7 +119,7 @@ def _without_open(found: Sensitivity, others: Sequence[Sensitivity], size: np.nd
 
 def _motion(period_map: PeriodMap, paths: Paths) -> Motion:
     """Return the motion of a period map's scene from its section."""
-    return Motion(period_map.given, paths, period_map.made, dynamics=period_map.dynamics)
+    return Motion(period_map.given, paths, period_map.made, dynamics=period_map.dynamics, earlier=period_map.earlier)
 
 
 def _same(turns: np.ndarray, other: np.ndarray, scale: np.ndarray) -> bool:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.orbits.newton import Orbit
 from vanedamp.coupling.response.restart_state import RestartState
@@ -50,6 +52,7 @@ def sensitivity(
     return found
 
 
+@np.errstate(all="ignore")  # nan is what is not known
 def _tried(
     motion: Orbit | RingDown | Ramp | Scene | str | Path, paths: Paths, orders: Sequence[int], times: list[float],
     start: RestartState | None,

@@ -142,7 +142,8 @@ class System(NamedTuple):
     @property
     def across(self) -> np.ndarray:
         """Whether each contact (contacts,) is one with a floor or a ceiling."""
-        return np.isin(self.surface[: self.contacts], (FLOOR, CEILING))
+        side = self.surface[: self.contacts]
+        return (side == FLOOR) | (side == CEILING)
 
     @property
     def travels(self) -> np.ndarray:

@@ -200,8 +200,9 @@ def _of_size(one: Dual, size: Any) -> Any:
 
 def _check_apart(one: Any, other: Any) -> None:
     """Raise NotSmooth where equal values turn apart."""
-    equal = np.asarray(values(one) == values(other))
-    if equal.any():
+    equal = values(one) == values(other)
+    if np.any(equal):
+        equal = np.asarray(equal)
         apart = [np.broadcast_to(_turns(each), (*equal.shape, _turns(each).shape[-1])) for each in (one, other)]
         if (equal & (apart[0] != apart[1]).any(axis=-1)).any():
             raise NotSmooth
@@ -215,7 +216,8 @@ def _product(one: Any, other: Any) -> Dual:
         turns = one.turns.swapaxes(-1, -2) @ b
         turns = turns if b.ndim == 1 else turns.swapaxes(-1, -2)
     if isinstance(other, Dual):
-        turns = turns + (a @ other.turns.reshape(len(b), -1)).reshape(*a.shape[:-1], *other.turns.shape[1:])
+        along, *more = other.turns.shape
+        turns = turns + (a @ other.turns.reshape(along, math.prod(more))).reshape(*a.shape[:-1], *more)
     return Dual(np.matmul(a, b), turns)
 
 

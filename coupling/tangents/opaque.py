@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from typing import Any, TypeVar
@@ -18,9 +17,8 @@ Record = TypeVar("Record")
 
 def changed(record: Record, **values: Any) -> Record:
     """Return a frozen record with other values, which are known to be valid and may have derivatives."""
-    made = copy.copy(record)
-    for name, value in values.items():
-        object.__setattr__(made, name, value)
+    made = object.__new__(type(record))
+    vars(made).update(vars(record), **values)
     return made
 
 
@@ -102,6 +100,8 @@ def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False)
     _mapped(arguments, turned.append, _is_dual)
     ways = [p for p in range(count) if any(one.turns[..., p].any() for one in turned)]
     with dual.numbers(None):
+        if not turned:
+            return function(*arguments)
         found = function(*plain(arguments))
         here = _flat(found) if ways else []
         if not here:

@@ -227,7 +227,7 @@ def by_numbers(
             if state is None or way is None:
                 return observed(moved, known, None)
             # of the scene as it is now: a body in touch with a wall would follow it from another gap
-            there = replace(walked, given=moved, _earlier=[])
+            there = replace(walked, given=moved, earlier=[])
             return observed(moved, known, there.restart_of(state + way * change))
         except InputError:
             return None

@@ -444,7 +444,7 @@ def test_passages_do_not_depend_on_those_before(seed, tmp_path):
     path = list(numbers_of(scene, False))[:2]
     for state in (one, other, one):
         for made in (found, found.over(2), found.by(tuple(path))):
-            fresh = replace(made, _earlier=[])(state)
+            fresh = replace(made, earlier=[])(state)
             again = made(state)
             assert again.status is fresh.status and again.crossings == fresh.crossings
             for name in ("state", "derivative", "by_number", "peaks"):

@@ -73,7 +73,7 @@ def test_the_wave_is_the_long_run_and_the_orbit_of_whole_periods():
 def test_a_part_of_a_period_with_its_sectors_shifted_commutes_with_the_period(sectors, order, times):
     scene = ring(sectors, order)
     along = period_map(scene)
-    wave, symmetry = replace(along, wave=True, _earlier=[]), along.travelling
+    wave, symmetry = replace(along, wave=True, earlier=[]), along.travelling
     assert symmetry.times == times and symmetry.part == 1 / times
     # any motion, not only a wave
     state = along.linear_orbit() + 0.1 * along.scale * np.random.default_rng(0).normal(size=len(along.scale))
@@ -180,7 +180,7 @@ def test_an_impact_passes_the_start_of_a_part_and_one_of_another_sector_its_end(
     scene = ring_scene(tmp_path / "ring.h5", 5, 2, 600)
     along, begin = period_map(scene, "excitation.force"), 0.0524171
     section, state = of_waves(along).later(find_orbit(scene).state, begin)
-    problem, table = Problem.along(replace(section, _earlier=[]), 24.951, -0.005), {"from": 24.951, "to": 24.946}
+    problem, table = Problem.along(replace(section, earlier=[]), 24.951, -0.005), {"from": 24.951, "to": 24.946}
     found = solve(problem, problem.pack(state, 24.951), problem.row())
     path = Continuation(
         Table(**table, step=0.3, min_step=0.1, max_step=1.0, max_points=9), Point(problem, found, problem.row())
