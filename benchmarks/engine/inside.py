@@ -59,7 +59,7 @@ def time_of_parts(scene: Scene, period: int, rounds: int) -> dict[str, float]:
     code = run.advance(period, scene.solver.max_events)
     search, accounting = np.zeros(rounds), np.zeros(rounds)
     while True:
-        searched = run.system, run.flows, run.state, run.watched
+        searched = run.system, run.flows, run.state, run.watched, run.records
         tau = _as_run(_search, run, *searched, 1)
         grown = run.flows, run.state, run.scratch, tau
         _as_run(_amplitudes, run, *grown)
@@ -89,11 +89,11 @@ def _begun(scene: Scene, periods: int) -> EngineRun:
 
 
 @entry
-def _search(system: Any, flows: Any, st: Any, functions: Any, times: int) -> float:
+def _search(system: Any, flows: Any, st: Any, functions: Any, records: Any, times: int) -> float:
     tau = 0.0
     for _ in range(times):
         st.counters[CARRIED] = 0  # what is known from the period before would save it
-        tau, _, _ = next_event(system, flows, st, functions)
+        tau, _, _ = next_event(system, flows, st, functions, records)
     return tau
 
 
