@@ -13,7 +13,7 @@ import math
 
 from vanedamp.coupling.engine.line.gap_kinematics import measure_gaps, shift_slip
 from vanedamp.coupling.engine.root_search import first_root_of_parabola
-from vanedamp.coupling.numerics.codes import ACTIVE, ASLEEP, CLOSED_ROWS, FLOW, PERIOD
+from vanedamp.coupling.numerics.codes import ACTIVE, ASLEEP, CLOSED_ROWS, FLOW, OPEN, PERIOD
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.response.records import FRICTION
 
@@ -55,6 +55,8 @@ def falls_asleep(system, flows, st, watched, r, k):
         return False
     b = system.right_body[first]
     margin, speed_margin, stop = 0.5 * watched.k0[k, 0], math.inf, watched.stop[b]
+    if watched.sides[k] == 1 and stop < 0:  # it may turn round and meet the other wall
+        return False
     time = bounded_step(margin, watched.k1[k], watched.bound[k] - watched.k2[k])
     if watched.sides[k] == 2:
         other = 0.5 * watched.k0[k, 1]
@@ -80,7 +82,7 @@ def falls_asleep(system, flows, st, watched, r, k):
 
 @inlined
 def _first_contact(system, st, r):
-    """Return the first contact of the body of contact r if it is alone, between walls that move with it; else -1."""
+    """Return the first contact of the body of contact r if it is alone, open to walls that move with it; else -1."""
     first = r if system.left_body[r] < 0 else r - 1
     if first < system.friction_rows or first + 1 == len(st.state):
         return -1
@@ -88,7 +90,8 @@ def _first_contact(system, st, r):
     if body < 0 or system.left_body[first] >= 0 or system.left_body[first + 1] != body:
         return -1
     walls = system.right_body[first + 1] < 0 and system.moves_with_floor[first] and system.moves_with_floor[first + 1]
-    return first if walls else -1
+    both_open = st.state[first] == OPEN and st.state[first + 1] == OPEN
+    return first if walls and both_open else -1
 
 
 @summing

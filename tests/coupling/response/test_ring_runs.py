@@ -77,14 +77,20 @@ def test_six_bodies_follow_an_independent_integrator(file, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("sectors", "mass", "friction", "wave"), [(8, 0.3, 0.0, 3), (7, 0.1, 0.6, 1), (8, 0.01, 0.1, 2)]
-)
-def test_sleeping_bodies_follow_an_independent_integrator(sectors, mass, friction, wave, tmp_path):
+    ("sectors", "mass", "friction", "wave", "contact"),
+    [
+        (8, 0.3, 0.0, 3, {"law": "newton"}), (7, 0.1, 0.6, 1, {"law": "newton"}), (8, 0.01, 0.1, 2, {"law": "newton"}),
+        (7, 0.05, 0.1, 2, {"law": "compliant", "stiffness": 1e6}),
+    ],
+)  # fmt: skip
+def test_sleeping_bodies_follow_an_independent_integrator(sectors, mass, friction, wave, contact, tmp_path):
     """Heavy bodies wake each other by their impacts, without friction as well; light ones sleep for long."""
     chain = Chain(sectors=sectors, damping_ratio=0.01)
     frequency = 1.01 * float(np.sqrt(chain.squares([wave])[0]) / (2 * np.pi))
     made = scene(chain.saved(tmp_path), excitation={"frequency": frequency, "force": 25.0, "at": "tip", "wave": wave})
-    made = made.replace({"damper.0.mass": mass, "damper.0.friction": friction, "cavity.c.gap": 5e-5})
+    made = made.replace(
+        {"damper.0.mass": mass, "damper.0.friction": friction, "cavity.c.gap": 5e-5, "contact": contact}
+    )
     model = chain.ring().model(None)
     model.save(tmp_path / "rom.h5")
     data = unrolled(made).to_dict() | {"structure": {"model": "rom", "file": str(tmp_path / "rom.h5")}}
