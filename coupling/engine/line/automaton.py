@@ -157,7 +157,7 @@ def _begin_flow(system, flows, st, rec, scratch):
             spend_on_friction(system, flows, st, scratch)
         else:
             wake_all(system, flows, st, rec, scratch)
-    if st.counters[BEGUN] == 1 and s == st.counters[FLOW] and _only_friction(system, st):
+    if st.counters[BEGUN] == 1 and s == st.counters[FLOW] and _only_friction(flows, system, st):
         _change_amplitudes(system, flows, st, rec, scratch)
         _change_friction(system, flows, st, rec)
         st.counters[SEARCHING] = 0
@@ -178,9 +178,9 @@ def _begin_flow(system, flows, st, rec, scratch):
 
 
 @inlined
-def _only_friction(system, st):
+def _only_friction(flows, system, st):
     """Whether nothing changes in a crowd in flight but friction, and speeds by impulses."""
-    only = may_sleep(system, st)
+    only = may_sleep(flows, st)
     for r in range(system.bodies, len(st.state)):
         only = only and st.applied_force[r] == st.included_force[r]
     return only

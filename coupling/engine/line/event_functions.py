@@ -136,7 +136,7 @@ def _list_functions(system, flows, st, watched, s, woken, count):
 
     woken: the first contact of that body, 0 without one.
     """
-    tired = woken == 0 and may_sleep(system, st)
+    tired = woken == 0 and may_sleep(flows, st)
     r, end, contact, last = ZERO, system.friction_rows, system.friction_rows, len(st.state)
     if woken > 0:
         r, contact, last = system.right_body[woken], woken, woken + 2

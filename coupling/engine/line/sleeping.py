@@ -16,9 +16,10 @@ from vanedamp.coupling.engine.root_search import first_root_of_parabola
 from vanedamp.coupling.numerics.codes import ACTIVE, ASLEEP, CLOSED_ROWS, FLOW, OPEN, PERIOD
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
 from vanedamp.coupling.response.records import FRICTION
+from vanedamp.coupling.system.line_system import LineSystem
 
-#: bodies from which on they sleep, and the shortest sleep, in periods over their number: otherwise it does not pay
-CROWD, _DOZE = 6, 0.25
+#: bodies times modes from which on bodies sleep, and the shortest sleep, in periods over bodies: others cost time
+CROWD, _DOZE = 100, 0.25
 
 #: of a sleeping body: when it wakes, and since when it sleeps, s in the period; its place, the lower word of that, and
 #: its speed then, and what the structure has of both; what is left of its margins, m and m/s
@@ -26,10 +27,15 @@ UNTIL, SINCE, PLACE, LOW, SPEED, PART, RATE, MARGIN, SPEED_MARGIN = range(9)
 SLEEP = 9
 
 
+def in_crowd(system: LineSystem) -> int:
+    """Return how many bodies may sleep: all in a crowd, or none."""
+    return system.bodies if system.bodies * system.modes >= CROWD else 0
+
+
 @inlined
-def may_sleep(system, st):
+def may_sleep(flows, st):
     """Whether bodies may sleep: there are many, and no row is closed."""
-    return system.bodies >= CROWD and st.counters[CLOSED_ROWS] == 0
+    return flows.step.shape[1] > 0 and st.counters[CLOSED_ROWS] == 0
 
 
 @inlined

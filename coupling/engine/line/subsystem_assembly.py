@@ -19,7 +19,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.engine.known import ROOM, places
-from vanedamp.coupling.engine.line.sleeping import CROWD
+from vanedamp.coupling.engine.line.sleeping import in_crowd
 from vanedamp.coupling.engine.line.subsystems import most_modes
 from vanedamp.coupling.engine.line.tolerances import MANY
 from vanedamp.coupling.engine.peaks import GRIDS
@@ -120,5 +120,5 @@ def empty_flows(system: LineSystem, capacity: int | None = None) -> Flows:
     s, n, b, r, e = capacity, system.modes, system.bodies, len(system.delassus), len(system.frequency)
     m = most_modes(system) + e
     sizes = {"s": s, "n": n, "b": b, "N": n + b, "r": r, "e": e, "m": m, "pairs": m * (m + 3), "grids": GRIDS}
-    sizes["k"], sizes["c"] = len(system.outputs), b if b >= CROWD else 0
+    sizes["k"], sizes["c"] = len(system.outputs), in_crowd(system)
     return room(Flows, sizes | {"phases": e + 1, "maps": WORK_MAP + 4 * e, "kicks": WORK_MAP // 2 + 2 * e})

@@ -7,6 +7,7 @@ import pytest
 
 from tests.reference.comparison import follow
 from tests.tools.rings import Chain
+from vanedamp.coupling.engine.line import sleeping
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.sector_response import BY_SECTOR, SectorResponse
 from vanedamp.coupling.scene.scene import Scene
@@ -67,7 +68,8 @@ def test_one_cavity_is_that_of_a_single_structure(file, tmp_path):
     assert other.sectors is None
 
 
-def test_six_bodies_follow_an_independent_integrator(file, tmp_path):
+def test_six_bodies_follow_an_independent_integrator(file, tmp_path, monkeypatch):
+    monkeypatch.setattr(sleeping, "CROWD", 0)
     made = scene(file, excitation={"frequency": RESONANCE, "force": 25.0, "at": "tip", "wave": 2})
     single, model = as_single_structure(made, tmp_path)
     found = follow(single, 8, model, tmp_path)
@@ -83,8 +85,11 @@ def test_six_bodies_follow_an_independent_integrator(file, tmp_path):
         (7, 0.05, 0.1, 2, {"law": "compliant", "stiffness": 1e6}),
     ],
 )  # fmt: skip
-def test_sleeping_bodies_follow_an_independent_integrator(sectors, mass, friction, wave, contact, tmp_path):
+def test_sleeping_bodies_follow_an_independent_integrator(
+    sectors, mass, friction, wave, contact, tmp_path, monkeypatch
+):  # fmt: skip
     """Heavy bodies wake each other by their impacts, without friction as well; light ones sleep for long."""
+    monkeypatch.setattr(sleeping, "CROWD", 0)
     chain = Chain(sectors=sectors, damping_ratio=0.01)
     frequency = 1.01 * float(np.sqrt(chain.squares([wave])[0]) / (2 * np.pi))
     made = scene(chain.saved(tmp_path), excitation={"frequency": frequency, "force": 25.0, "at": "tip", "wave": wave})
