@@ -58,3 +58,12 @@ def row_change(motion, velocity, bend, gain, count):
         shift += motion[j].real * bend[j].real - motion[j].imag * bend[j].imag
         speed += velocity[j].real * gain[j].real - velocity[j].imag * gain[j].imag
     return shift, speed
+
+
+@summing
+def real_sum(functional, amplitude, count):
+    """Return the value of a functional of the first `count` amplitudes."""
+    total = 0.0
+    for j in range(count):
+        total += functional[j].real * amplitude[j].real - functional[j].imag * amplitude[j].imag
+    return total

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.engine.amplitudes import amplitude_changes, row_change
+from vanedamp.coupling.engine.amplitudes import amplitude_changes, real_sum, row_change
 from vanedamp.coupling.engine.line.compliant_contacts import begin_contact, change_contact, spring_force
 from vanedamp.coupling.engine.line.contact_states import (
     add_force,
@@ -157,7 +157,7 @@ def _begin_flow(system, flows, st, rec, scratch):
             spend_on_friction(system, flows, st, scratch)
         else:
             wake_all(system, flows, st, rec, scratch)
-    if st.counters[BEGUN] == 1 and s == st.counters[FLOW] and _only_friction(flows, system, st):
+    if st.counters[BEGUN] == 1 and s == st.counters[FLOW] and _only_friction(system, flows, st):
         _change_amplitudes(system, flows, st, rec, scratch)
         _change_friction(system, flows, st, rec)
         st.counters[SEARCHING] = 0
@@ -178,7 +178,7 @@ def _begin_flow(system, flows, st, rec, scratch):
 
 
 @inlined
-def _only_friction(flows, system, st):
+def _only_friction(system, flows, st):
     """Whether nothing changes in a crowd in flight but friction, and speeds by impulses."""
     only = may_sleep(flows, st)
     for r in range(system.bodies, len(st.state)):
@@ -458,7 +458,7 @@ def _set_constant_forces(system, flows, st, scratch, s):
     for r in range(r_count):
         st.constant_force[r] = 0.0
         if sprung and st.state[r] == SPRUNG:
-            force = _real_sum(flows.force[s, r], st.amplitude, flows.modes[s])
+            force = real_sum(flows.force[s, r], st.amplitude, flows.modes[s])
             st.constant_force[r] = spring_force(system, st, r) - force
         rigid_closed = rigid_closed or flows.closed_inverse[s, r, r] != 0.0
     if not rigid_closed:
@@ -483,15 +483,6 @@ def _set_constant_forces(system, flows, st, scratch, s):
             force -= flows.closed_inverse[s, r, k] * scratch.acceleration[k]
             size += abs(flows.closed_inverse[s, r, k]) * scratch.jerk[k]
         st.constant_force[r] = force if abs(force) > CANCELLED * size else 0.0
-
-
-@summing
-def _real_sum(functional, amplitude, count):
-    """Return the value of a functional of the first `count` amplitudes."""
-    total = 0.0
-    for j in range(count):
-        total += functional[j].real * amplitude[j].real - functional[j].imag * amplitude[j].imag
-    return total
 
 
 @inlined

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.engine.line.gap_kinematics import measure_gaps
 from vanedamp.coupling.engine.line.sleeping import bounded_step, falls_asleep, first_to_wake, may_sleep, sleeps, wake
 from vanedamp.coupling.engine.line.tolerances import ADHESION, RECLOSING
 from vanedamp.coupling.engine.root_search import (
@@ -75,6 +76,7 @@ def next_event(system, flows, st, watched, rec):
         if body >= 0 and first - st.time[0] <= tau:
             woken, listed = st.asleep[body], False
             wake(system, flows, st, rec, body)
+            measure_gaps(system, st)
             continue
         if k < 0:
             st.counters[CARRIED] = count

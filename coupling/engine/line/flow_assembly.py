@@ -454,6 +454,7 @@ def _set_energies(system, flows, s, m, forms):
     flows.slow_count[s] = list_single(flows, s, m, system.period, pairs)
     for r in range(rows if jumps else 0):
         _set_maps(flows, s, e, m, flows.impulse_response[s, r], flows.kick_maps[s, r])
+    for r in range(rows if crowd > 0 else 0):
         moved, stirred = 0.0, 0.0
         for j in range(e, m):
             rate = abs(flows.eigenvalue[s, j])

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import math
 
+from vanedamp.coupling.engine.amplitudes import real_sum
 from vanedamp.coupling.engine.line.gap_kinematics import measure_gaps, shift_slip
 from vanedamp.coupling.engine.root_search import first_root_of_parabola
 from vanedamp.coupling.numerics.codes import ACTIVE, ASLEEP, CLOSED_ROWS, FLOW, OPEN, PERIOD
-from vanedamp.coupling.numerics.compiler.jit import inlined, kernel, summing
+from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.response.records import FRICTION
 from vanedamp.coupling.system.line_system import LineSystem
 
@@ -76,10 +77,7 @@ def falls_asleep(system, flows, st, watched, r, k):
     body = st.sleepers[b]
     body[UNTIL], body[SINCE] = st.time[0] + time, st.time[0]
     body[PLACE], body[LOW], body[SPEED] = st.displacement[b], st.low_word[b], st.velocity[b]
-    body[PART], body[RATE] = _of_structure(
-        flows.motion[st.counters[FLOW], b], flows.velocity[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE],
-        system.J[b], st.constant,
-    )  # fmt: skip
+    body[PART], body[RATE] = _of_structure(system, flows, st, b)
     body[MARGIN], body[SPEED_MARGIN] = margin, speed_margin
     st.asleep[b] = first
     st.counters[ASLEEP] += 1
@@ -100,16 +98,18 @@ def _first_contact(system, st, r):
     return first if walls and both_open else -1
 
 
-@summing
-def _of_structure(motion, velocity, amplitude, count, functional, constant):
-    """Return what the structure has of a slip and of its rate."""
-    part, rate = 0.0, 0.0
-    for j in range(count):
-        part += motion[j].real * amplitude[j].real - motion[j].imag * amplitude[j].imag
-        rate += velocity[j].real * amplitude[j].real - velocity[j].imag * amplitude[j].imag
-    for i in range(len(constant)):
-        part += functional[i] * constant[i]
-    return part, rate
+@inlined
+def _of_structure(system, flows, st, b):
+    """Return what the structure has of a body's slip, m, and of its rate, m/s."""
+    part = real_sum(flows.motion[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE])
+    for i in range(len(st.constant)):
+        part += system.J[b, i] * st.constant[i]
+    return part, _rate(flows, st, b)
+
+
+@inlined
+def _rate(flows, st, b):
+    return real_sum(flows.velocity[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE])
 
 
 @inlined
@@ -129,25 +129,14 @@ def free_speed(flows, st, b):
     if st.asleep[b] != 0:
         body = st.sleepers[b]
         return (body[SPEED] - body[RATE]) + st.free_acceleration[b] * (st.time[0] - body[SINCE])
-    return st.velocity[b] - _rate(flows.velocity[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE])
-
-
-@summing
-def _rate(velocity, amplitude, count):
-    total = 0.0
-    for j in range(count):
-        total += velocity[j].real * amplitude[j].real - velocity[j].imag * amplitude[j].imag
-    return total
+    return st.velocity[b] - _rate(flows, st, b)
 
 
 @kernel
 def _bring(system, flows, st, b):
     """Bring a sleeping body to the present. Return how far it has slipped since it fell asleep, m."""
     body, time = st.sleepers[b], st.time[0] - st.sleepers[b, SINCE]
-    part, rate = _of_structure(
-        flows.motion[st.counters[FLOW], b], flows.velocity[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE],
-        system.J[b], st.constant,
-    )  # fmt: skip
+    part, rate = _of_structure(system, flows, st, b)
     free, bend = body[SPEED] - body[RATE], st.free_acceleration[b]
     shift = (part - body[PART]) + time * (free + 0.5 * bend * time)
     st.displacement[b], st.low_word[b], st.velocity[b] = body[PLACE], body[LOW], (free + bend * time) + rate
@@ -157,14 +146,13 @@ def _bring(system, flows, st, b):
 
 @kernel
 def wake(system, flows, st, rec, b):
-    """Let a body wake, with the friction of the time that it slept."""
+    """Let a body wake, with the friction of the time that it slept; its gaps are to be measured."""
     shift = _bring(system, flows, st, b)
     st.ledger[FRICTION] -= st.applied_force[b] * shift
     if rec.worn.shape[1] > 0:
         rec.worn[st.counters[PERIOD], b] += abs(st.applied_force[b] * shift)
     st.asleep[b] = 0
     st.counters[ASLEEP] -= 1
-    measure_gaps(system, st)
 
 
 @kernel
@@ -173,6 +161,7 @@ def wake_all(system, flows, st, rec, scratch):
     for b in range(system.bodies):
         if st.asleep[b] != 0:
             _wake_struck(system, flows, st, rec, scratch, b)
+    measure_gaps(system, st)
 
 
 @kernel
@@ -181,7 +170,6 @@ def _wake_struck(system, flows, st, rec, scratch, b):
     wake(system, flows, st, rec, b)
     for r in range(len(st.state)):
         st.velocity[b] += system.delassus[b, r] * scratch.impulse[r]
-    measure_gaps(system, st)
 
 
 @kernel
@@ -209,6 +197,7 @@ def spend_on_impulses(system, flows, st, rec, scratch):
     for b in range(system.bodies):
         if st.asleep[b] != 0 and min(st.sleepers[b, MARGIN], st.sleepers[b, SPEED_MARGIN]) <= 0.0:
             _wake_struck(system, flows, st, rec, scratch, b)
+    measure_gaps(system, st)
 
 
 @kernel
