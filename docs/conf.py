@@ -20,6 +20,7 @@ extensions = [
     # ours, in _ext
     "docs._ext.commands",
     "docs._ext.fields",
+    "docs._ext.layout",
     "docs._ext.quantities",
     "docs._ext.pages",
     "docs._ext.python_api",
