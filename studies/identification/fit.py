@@ -37,6 +37,10 @@ class OutOfTime(Exception):
     """The time that a search may take is over."""
 
 
+class _Settled(Exception):
+    """A step of a search can bring no more than the change at which the minimum is found."""
+
+
 class Minimum(NamedTuple):
     """Where a search has ended: coordinates (P,), sum of squares, and whether it converged."""
 
@@ -162,27 +166,36 @@ class Fit:
             whole[free] = part
             return whole
 
-        slopes, lowest = _Slopes(self), list[Minimum]()
+        slopes, lowest, tolerance = _Slopes(self), list[Minimum](), 0.0
+        residual = np.zeros(0)  # of the lowest
 
         def off(part: np.ndarray) -> np.ndarray:
-            found = self.residual(full(part))
-            if not lowest or found @ found < lowest[0].misfit:
-                lowest[:] = [Minimum(full(part), float(found @ found), False)]
+            nonlocal residual
+            here, found = full(part), self.residual(full(part))
+            misfit, moved = float(found @ found), bool(lowest) and not np.array_equal(here, lowest[0].z)
+            # least_squares itself ends on a step that lowers the misfit by little, but not on one that raises it so
+            settled = moved and _gain(residual, found) <= tolerance * lowest[0].misfit
+            if not lowest or misfit < lowest[0].misfit:
+                lowest[:], residual = [Minimum(here, misfit, False)], found
+            if settled:
+                raise _Settled
             return found
 
         start = np.clip(z[free], 1e-9, 1 - 1e-9)
         try:
             off(start)
             rough = self.scatter(full(start)) / max(lowest[0].misfit, _TINY)  # of which nothing better can be found
+            tolerance = min(max(close, rough), _LEAST_CLOSE)
             found = least_squares(
-                off, start, lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0),
-                ftol=min(max(close, rough), _LEAST_CLOSE), xtol=_LEAST_STILL if rough else _STILL, gtol=1e-12,
-                max_nfev=most,
+                off, start, lambda part: slopes.at(full(part))[:, free], bounds=(0.0, 1.0), ftol=tolerance,
+                xtol=_LEAST_STILL if rough else _STILL, gtol=1e-12, max_nfev=most,
             )  # fmt: skip
         except OutOfTime:
             if not lowest:
                 raise
             return lowest[0]
+        except _Settled:
+            return lowest[0]._replace(converged=True)
         return Minimum(full(found.x), float(2.0 * found.cost), bool(found.status > 0))
 
     def estimate(self, z: np.ndarray) -> bool:
@@ -232,6 +245,15 @@ class Fit:
             arrays[channel.name] for measured, arrays in zip(self.study.measured, of, strict=True)
             for channel in measured.channels
         ]  # fmt: skip
+
+
+def _gain(before: np.ndarray, after: np.ndarray) -> float:
+    """Return by how much sums of squares fall at most from one end of a step to anywhere on it, from residuals (N,).
+
+    If these were straight over the step: |r + t d|^2 with d the change is lowest amid ends of one height.
+    """
+    moved = after - before
+    return abs(float(after @ after - before @ before)) + 0.25 * float(moved @ moved)
 
 
 class _Slopes:

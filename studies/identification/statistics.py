@@ -17,7 +17,7 @@ LEVEL = 0.95
 #: motions do not repeat; most profile points a side
 _CLOSE, _ROUGH, _MOST = 0.02, 0.2, 12
 #: width over the first step of the bracket in which an end lies, at which it is found, as where the misfit jumps
-_NARROW = 0.01
+_NARROW = 0.02
 #: change of the sum of squares, relative, at which the other numbers of a profile point are found
 _PROFILE = 1e-4
 #: first step of a profile of a number that the derivatives do not tell, as a fraction of its range
@@ -115,6 +115,7 @@ def _end(
     inner, outer = (start, 0.0, best), None
     step = goal * deviation if np.isfinite(deviation) and deviation > 0.0 else _FAR
     at = start + way * min(step, abs(bound - start))
+    bracketed = 0
     for _ in range(_MOST):
         if at == inner[0]:
             return bound, True
@@ -136,7 +137,8 @@ def _end(
             ahead = start + (at - start) * min(goal / max(root, 0.25 * goal), 4.0) * 1.02
             at = min(ahead, bound) if way > 0 else max(ahead, bound)
         else:
-            share = (goal - inner[1]) / (outer[1] - inner[1])
+            bracketed += 1  # secants alone move one end only, slowly where the misfit jumps
+            share = 0.5 if bracketed % 3 == 0 else (goal - inner[1]) / (outer[1] - inner[1])
             at = inner[0] + float(np.clip(share, 0.1, 0.9)) * (outer[0] - inner[0])
     return float(inner[0] if outer is None else outer[0]), False
 

@@ -12,7 +12,7 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.identification.data import decay, forced, impacts
 from vanedamp.studies.identification.decay import interpolated
 from vanedamp.studies.identification.density import LogDensity
-from vanedamp.studies.identification.fit import Fit
+from vanedamp.studies.identification.fit import Fit, _gain
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.identification.tables import ForcedTable, ImpactsTable, Number, Prior
 
@@ -55,6 +55,18 @@ def test_minimum_is_the_truth_without_noise():
     found = Fit(sought).minimum(sought.coordinates(TRUTH * [1.8, 1.04]), close=1e-14)
     assert found.converged and found.misfit < 1e-8
     assert sought.values(found.z) == pytest.approx(TRUTH, rel=1e-6)
+
+
+def test_no_point_of_a_step_is_lower_by_more_than_its_ends_tell():
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        before, after = rng.normal(size=(2, 6)) * rng.uniform(0.1, 2.0, (2, 1))
+        share = np.linspace(0.0, 1.0, 2001)[:, None]
+        lowest = np.square((1.0 - share) * before + share * after).sum(axis=1).min()
+        most = min(before @ before, after @ after) - lowest
+        assert most <= _gain(before, after)
+    level = np.array([1.0, 2.0])  # amid ends of one height the bound is what there is
+    assert _gain(level, -level) == pytest.approx(level @ level)
 
 
 def test_phases_and_harmonics():
