@@ -118,15 +118,14 @@ def numbers_of(
     """Return the derivatives of a scene's equations by the numbers at some paths.
 
     begins: the start of the motion, if numbers change it; derived: the scene that moves, from the one that has the
-    numbers. Raises InputError for a path that names no number of the equations, and NotSmooth where the equations
-    have a kink.
+    numbers; both take numbers with derivatives. Raises InputError for a path that names no number of the equations, and
+    NotSmooth where the equations have a kink.
     """
     names = tuple(path.name if isinstance(path, MatrixDirection) else path for path in paths)
     turned, moves, sizes = _turned(scene, paths, dynamics, derived)
-    same = derived(scene) is scene
     with numbers(len(paths)):
         try:
-            moving = turned if same else opaque(derived, turned)
+            moving = derived(turned)
             if moves:
                 moving = changed(moving, structure=changed(moving.structure, moves=tuple(moves)))
             frame = Frame(moving, dynamics.frame.speed, dynamics.frame.begin)

@@ -34,6 +34,7 @@ from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.simulation import simulate
+from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.files.toml_input import InputError
 
 #: periods before the end of a part that are at its end
@@ -85,7 +86,7 @@ class PeriodMap:
     def _numbers(self) -> Numbers | None:
         if not self.numbers:
             return None
-        return numbers_of(self.given, self.numbers, self.dynamics, derived=self.made)
+        return numbers_of(self.given, self.numbers, self.dynamics, derived=partial(opaque, self.made))
 
     @cached_property
     def _event_names(self) -> EventNames:

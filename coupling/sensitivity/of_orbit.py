@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from vanedamp.coupling.sensitivity.measures import Measures
 from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, record
 from vanedamp.coupling.sensitivity.passed import Passed
 from vanedamp.coupling.sensitivity.sensitivity_record import SERIES, Sensitivity, SensitivityStatus
+from vanedamp.coupling.tangents.opaque import opaque
 from vanedamp.files.store import frozen
 
 #: round-off of a period map, relative, and error of an orbit's derivatives, relative, beyond which it is at a fold
@@ -119,7 +121,8 @@ def _without_open(found: Sensitivity, others: Sequence[Sensitivity], size: np.nd
 
 def _motion(period_map: PeriodMap, paths: Paths) -> Motion:
     """Return the motion of a period map's scene from its section."""
-    return Motion(period_map.given, paths, period_map.made, dynamics=period_map.dynamics, earlier=period_map.earlier)
+    made = partial(opaque, period_map.made)
+    return Motion(period_map.given, paths, made, dynamics=period_map.dynamics, earlier=period_map.earlier)
 
 
 def _same(turns: np.ndarray, other: np.ndarray, scale: np.ndarray) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,7 @@ def of_ring_down(found: RingDown, paths: Paths, orders: Sequence[int], times: Se
     def begins(other: Scene, frame: Frame) -> np.ndarray:
         if state is not None:
             return state
-        return frame.state_of(opaque(lambda one: blown_or_pulled(run_of(one), table), other))
+        return frame.state_of(blown_or_pulled(run_of(other), table))
 
     motion = Motion(scene, paths, lambda other: free_scene(run_of(other), table=table), begins)
     numbers, response, mode = motion.numbers, motion.dynamics.response, found.linear.mode
@@ -77,7 +78,7 @@ def of_ramp(ramp: Ramp, paths: Paths) -> Sensitivity:
     for period, value in enumerate(course.value[: len(ramp.runs[0].time)].tolist()):
 
         def at(other: Scene, value: float = value) -> Scene:
-            return scene_at(ramped(run_of(other)), table, value)
+            return opaque(lambda one: scene_at(ramped(run_of(one)), table, value), other)
 
         motion = Motion(scene, paths, at, _own_start, speed=float(course.speed[0]))
         if period == 0:
@@ -113,7 +114,7 @@ def _alone(scene: Scene) -> tuple[Scene, Callable[[Scene], Scene]]:
     Numbers are those of the scene as it is given: one of a ring may be many of its sectors'.
     """
     choices = choices_of([scene])
-    return replace(scene, sweep={}, orbit=None), lambda other: with_choices(other, choices).scene
+    return replace(scene, sweep={}, orbit=None), partial(opaque, lambda other: with_choices(other, choices).scene)
 
 
 def _own_start(scene: Scene, frame: Frame) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +15,8 @@ from vanedamp.coupling.scene.structures import Initial, Prescribed, Rom
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.modal_basis import basis_of, forced_label, interface_row
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.tangents.dual import active, array, values
+from vanedamp.coupling.tangents.opaque import changed
 from vanedamp.coupling.transients.ramp_course import MOST_PERIODS
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
@@ -63,23 +64,22 @@ def free_scene(scene: Scene, table: RingDownTable) -> Scene:
 
     Raises InputError for a motion of more periods than anyone would wait for.
     """
-    periods = table.periods or math.ceil((table.duration or 0.0) * scene.frequency)
+    periods = table.periods or math.ceil((table.duration or 0.0) * values(scene.frequency))
     if periods > MOST_PERIODS:
         name = "periods" if table.periods else "duration"
         raise InputError(f"ring_down.{name}: takes {periods:.3g} periods of the excitation; at most {MOST_PERIODS}")
-    return replace(
-        scene, excitation=Excitation(frequency=scene.frequency, at=scene.excitation.at),
-        time=Time(periods=periods, transient=0), sweep={}, orbit=None,
-    )  # fmt: skip
+    excitation = changed(Excitation(frequency=1.0, at=scene.excitation.at), frequency=scene.frequency)
+    return changed(scene, excitation=excitation, time=Time(periods=periods, transient=0), sweep={}, orbit=None)
 
 
 def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     """Return the state right after a hammer blow, at a static pull, or the scene's initial one.
 
     A blow acts on the structure only: bodies move by friction and impacts only. A pull moves the cavities
-    with their bodies, and leaves the springs of friction dampers unloaded. Raises InputError.
+    with their bodies, and leaves the springs of friction dampers unloaded. Numbers of the scene may have derivatives.
+    Raises InputError.
     """
-    system = assemble(scene)
+    system, kept = assemble(scene), frozen if active() is None else array
     state, scale = start_of(scene, system), system.scale
     if table.impulse is None and table.displacement is None:
         return state
@@ -90,12 +90,9 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     if table.displacement is not None:
         softness = row / system.of_structure.stiffness
         p = softness * (table.displacement / (row @ softness))
-        stops = np.flatnonzero((system.without_body & np.isinf(system.spring))[: system.contacts])
-        if np.any(before_stops(system.J[stops, : system.modes], system.rest[stops], p) != p):
-            raise InputError(
-                f"ring_down.displacement: {table.displacement:g} m would bring the structure beyond a stop; take less"
-            )
-        return replace(state, displacement=frozen(state.displacement + scale * p))
+        if active() is None:
+            _check_stops(system, p, table.displacement)
+        return changed(state, displacement=kept(state.displacement + scale * p))
     rate = row * (table.impulse or 0.0)
     n = system.modes
     slip = state.slip_velocity - system.floor[:, :n] @ rate
@@ -104,7 +101,16 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
         extended = system.tilt >= 0
         moved["lift_velocity"] = state.lift_velocity - np.where(extended, system.rise[:, :n] @ rate, 0.0)
         moved["tilt_rate"] = state.tilt_rate - np.where(extended, system.turn[:, :n] @ rate, 0.0)
-    return replace(state, **{name: frozen(values) for name, values in moved.items()})
+    return changed(state, **{name: kept(rates) for name, rates in moved.items()})
+
+
+def _check_stops(system: System, p: np.ndarray, displacement: float) -> None:
+    """Raise InputError for a pull to modal coordinates (n,) beyond a stop."""
+    stops = np.flatnonzero((system.without_body & np.isinf(system.spring))[: system.contacts])
+    if np.any(before_stops(system.J[stops, : system.modes], system.rest[stops], p) != p):
+        raise InputError(
+            f"ring_down.displacement: {displacement:g} m would bring the structure beyond a stop; take less"
+        )
 
 
 def check_impacts(free: Scene, system: System, start: RestartState) -> None:

@@ -95,3 +95,16 @@ def test_functions_of_plain_numbers_have_differences():
     assert squares.turns[0] == pytest.approx([0.0, 12.0], rel=1e-12)
     assert squares.value.tolist() == [9.0, math.inf]
     assert word == "kept"
+
+
+def test_what_a_function_returns_as_it_was_given_keeps_its_derivatives():
+    calls = []
+
+    def function(pair: _Pair) -> _Pair:
+        calls.append(pair)
+        return pair
+
+    given = _Pair(Dual(0.5, [1.0, 0.0]), (3.0, "kept"))
+    with numbers(2):
+        assert opaque(function, given) is given
+    assert len(calls) == 1 and calls[0].first == 0.5
