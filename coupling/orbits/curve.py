@@ -1,8 +1,9 @@
 """Pseudo-arclength continuation of a curve: orbits over one number, or over two with a condition on them.
 
-A point is predicted along the tangent and corrected in the plane normal to it (Keller 1977). Events on the way are
-zeros of test functions, seen by their signs and located by their roots. Between events of the motion the period map is
-smooth, and so is a curve as long as the sequence of events along its orbits stays; where it ends is located from there.
+A point is predicted along the tangent and corrected in the plane normal to it (Keller 1977), or away from folds at one
+value of the number, whose scene is assembled once. Events on the way are zeros of test functions, seen by their signs
+and located by their roots. Between events of the motion the period map is smooth, and so is a curve as long as the
+sequence of events along its orbits stays; where it ends is located from there.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ _EFFORT = ((8, 3, 3), (16, 10, 9))
 _STRAIGHT, _BENT = 0.985, 0.9
 #: distance from the tangent, relative to the step, up to which steps grow where they are predicted on a curve
 _NEAR = 0.01
-#: share of the numbers in a tangent below which it is at a turn of both
-_FLAT = 0.05
+#: share of the numbers in a tangent below which it is at a turn of both; from which on it is away from folds
+_FLAT, _STEEP = 0.05, 0.2
 #: distances by which a prediction is moved to where the sequence of events is still that of the condition
 _LIFTS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 #: relative error of numbers where an event is, or the sequence changes; and scaled one of a range's end
@@ -173,9 +174,21 @@ def predicted(head: Point, at: float, known: Sequence[np.ndarray] = ()) -> np.nd
     return np.asarray(curve(at))
 
 
-def corrected(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
-    """Return the point in the plane normal to the tangent, at a distance along it; None if there is none near."""
-    return near(head, predicted(head, step, known), head.tangent, abs(step))
+def corrected(
+    head: Point, step: float, known: Sequence[np.ndarray] = (), row: np.ndarray | None = None
+) -> Point | None:
+    """Return the point in a plane, by default normal to the tangent, at a distance along it; None if there is none."""
+    return near(head, predicted(head, step, known), head.tangent if row is None else row, abs(step))
+
+
+def _row(head: Point) -> np.ndarray:
+    """Return the normal (k + m,) of the plane in which the next point is sought.
+
+    Away from folds of a curve over one number that is its own: Newton's method then stays in one scene.
+    """
+    if head.given is not None or abs(head.tangent[-1]) < _STEEP:
+        return head.tangent
+    return np.copysign(1.0, head.tangent[-1]) * head.problem.row()
 
 
 def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
@@ -183,9 +196,10 @@ def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point
 
     known: points (k + m,) from which it is predicted; where they lead to none of its sequence the tangent may.
     """
-    point = corrected(head, step, known)
+    row = _row(head)
+    point = corrected(head, step, known, row)
     if known and (point is None or point.passage.sequence != head.passage.sequence):
-        other = corrected(head, step)
+        other = corrected(head, step, (), row)
         point = other if other and other.passage.sequence == head.passage.sequence else point
     if point is None:
         return None
