@@ -8,6 +8,7 @@ eigenvalue problems (SLEPc) and inertia counts (see `parallel`), on MUMPS; a Fac
 from __future__ import annotations
 
 import contextlib
+import ctypes
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -44,7 +45,7 @@ class Factorization:
         self.size = int(matrix.shape[0])
         # only the factor is kept: its inputs take as much memory in the largest structures
         with contextlib.ExitStack() as stack:
-            given = stack.enter_context(owned(_upper_triangle(matrix)))
+            given = stack.enter_context(owned(_view(matrix)))
             try:
                 self._factor = _factor(stack, given, direct, inertia=direct == "mumps")
             except PETSc.Error as error:
@@ -108,9 +109,7 @@ class Product:
 
     def __init__(self, matrix: sparse.csr_array) -> None:
         self.shape = matrix.shape
-        indices = (matrix.indptr.astype(PETSc.IntType, copy=False), matrix.indices.astype(PETSc.IntType, copy=False))
-        self._kept = (*indices, matrix.data)  # PETSc reads them where they are
-        self._matrix = PETSc.Mat().createAIJWithArrays(matrix.shape, self._kept, comm=PETSc.COMM_SELF)
+        self._matrix = _view(matrix)
 
     def __call__(self, rows: np.ndarray) -> np.ndarray:
         """Return the products (k, m)."""
@@ -313,19 +312,20 @@ def _ascending(values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.
     return values[order], vectors[order]
 
 
-def _upper_triangle(matrix: sparse.csr_array) -> Any:
-    """Return the upper triangle of a symmetric CSR matrix as a symmetric one of PETSc; the caller destroys it."""
+def _view(matrix: sparse.csr_array) -> Any:
+    """Return a CSR matrix as one of PETSc, which reads and keeps its arrays where they are; the caller destroys it.
+
+    Direct solvers read the upper triangle only.
+    """
     matrix = matrix if matrix.has_sorted_indices else matrix.sorted_indices()
-    kept = matrix.indices >= np.repeat(np.arange(matrix.shape[0], dtype=np.int32), np.diff(matrix.indptr))
-    ends = np.r_[0, np.cumsum(kept, dtype=PETSc.IntType)][matrix.indptr]
-    csr = (ends.astype(PETSc.IntType), matrix.indices[kept].astype(PETSc.IntType), matrix.data[kept])
-    return PETSc.Mat().createSBAIJ(size=matrix.shape, bsize=1, csr=csr, comm=PETSc.COMM_SELF)
+    indices = (matrix.indptr.astype(PETSc.IntType, copy=False), matrix.indices.astype(PETSc.IntType, copy=False))
+    return PETSc.Mat().createAIJWithArrays(matrix.shape, (*indices, matrix.data), comm=PETSc.COMM_SELF)
 
 
 def _operator(task: str, matrix: sparse.csr_array | None) -> Any:
     """Return a PETSc matrix for a task; the caller destroys it."""
     if task == "inertia" and matrix is not None and parallel.COMM.size == 1:
-        return _upper_triangle(matrix)  # half the memory
+        return _view(matrix)
     return _distributed(matrix)
 
 
@@ -375,8 +375,21 @@ def _factor(stack: contextlib.ExitStack, matrix: Any, direct: str = "mumps", ine
     else:
         _analysed[direct] = _Analysed(ksp, given)
     ksp.setOperators(given)
-    ksp.setUp()
+    with _one_thread():
+        ksp.setUp()
     return ksp.getPC().getFactorMatrix()
+
+
+@contextlib.contextmanager
+def _one_thread() -> Iterator[None]:
+    """Where OMP_NUM_THREADS is 1, let it be 1: CHOLMOD asks OpenMP for four, which wait by spinning."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # another OpenMP, or none
+            openmp = ctypes.CDLL("libgomp.so.1")
+            if openmp.omp_get_max_threads() == 1:
+                stack.callback(openmp.omp_set_max_active_levels, openmp.omp_get_max_active_levels())
+                openmp.omp_set_max_active_levels(0)
+        yield
 
 
 def _forget(direct: str) -> None:

@@ -1,11 +1,15 @@
 """Modes against independent solvers and closed forms, on meshes that refine."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from petsc4py import PETSc
 from scipy import linalg, optimize, sparse
 from scipy.sparse.linalg import eigsh, spsolve
 
+from tests.tools.processes import environment
 from tests.tools.small_structures import truss
 from vanedamp.meshes.benchmarks import Block, build
 from vanedamp.modal import petsc
@@ -15,6 +19,17 @@ from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.participation import effective_masses, first_bending
 from vanedamp.modal.petsc import negative_eigenvalues, one_analysis
 from vanedamp.modal.records.modes import Modes
+
+# threads of a process before and after it factorises a grid's stiffness by CHOLMOD
+THREADS_OF_A_FACTORISATION = """
+import os
+from scipy import sparse
+from vanedamp.modal.petsc import Factorization
+line = sparse.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(14, 14))
+before = len(os.listdir("/proc/self/task"))
+Factorization(sparse.csr_array(sparse.kronsum(sparse.kronsum(line, line), line)), "cholmod")
+print(before, len(os.listdir("/proc/self/task")))
+"""
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
 
@@ -293,3 +308,26 @@ def test_one_analysis_serves_matrices_of_one_pattern():
             assert negative_eigenvalues(matrix) == np.count_nonzero(known < 0.0)
             with factorize(matrix) as factors:
                 assert matrix @ factors.solve(load) == pytest.approx(load, abs=1e-10)
+
+
+@pytest.mark.skipif(not petsc.has_cholmod(), reason="PETSc without SuiteSparse")
+@pytest.mark.skipif(sys.platform != "linux", reason="threads are counted in /proc")
+def test_one_thread_is_one_thread():
+    words = [sys.executable, "-c", THREADS_OF_A_FACTORISATION]
+    done = subprocess.run(words, capture_output=True, text=True, check=True, env=environment(OMP_NUM_THREADS="1"))
+    before, after = done.stdout.split()
+    assert after == before
+
+
+def test_factors_keep_nothing_of_their_matrix():
+    """PETSc reads a matrix where it is: a factor is that of the entries at its time, whatever becomes of them."""
+    random = np.random.default_rng(0)
+    matrix = sparse.csr_array(sparse.diags([-1.0, 2.5, -1.0], [-1, 0, 1], shape=(60, 60)))
+    known, dense = random.standard_normal(60), matrix.toarray()
+    for direct in ("cholmod", "mumps") if petsc.has_cholmod() else ("mumps",):
+        given = matrix.copy()
+        with petsc.Factorization(given, direct) as factors:
+            given.data[:] = np.nan
+            given.indices[:] = 0
+            del given
+            assert factors.solve(dense @ known) == pytest.approx(known, abs=1e-12)
