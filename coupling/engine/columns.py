@@ -32,12 +32,13 @@ LEVELS = ("excitation.force", "excitation.resonance_amplitude")
 #: keys whose numbers change no more than their columns, of bodies in the plane, too
 _KNOWN = ("frequency", "force", "resonance_amplitude", "displacement", "velocity", "position")
 _PLACES = re.compile(
-    r"(?P<table>excitation|initial|cavity|damper)(\.(?P<entry>[^.]+))?\."
-    r"(?P<key>frequency|force|resonance_amplitude|displacement|velocity|gap|friction|restitution|position)"
+    r"(?P<table>excitation|initial|cavity|damper|friction_damper)(\.(?P<entry>[^.]+))?\."
+    r"(?P<key>frequency|force|resonance_amplitude|displacement|velocity|gap|friction|restitution|position|normal_force)"
 )
 _KEYS = {
     "excitation": ("frequency", "force", "resonance_amplitude"), "initial": ("displacement", "velocity"),
     "cavity": ("gap",), "damper": ("friction", "restitution", "position", "velocity"),
+    "friction_damper": ("normal_force", "friction"),
 }  # fmt: skip
 
 
@@ -99,6 +100,8 @@ def _in_the_way(scene: Scene, table: str, key: str) -> bool:
         return getattr(excitation, key) is None or excitation.distributed or any(scene.elements) or _pulled(scene)
     if table == "initial":
         return any(scene.elements) or not hasattr(scene.structure, "mass")
+    if table == "friction_damper":  # in more than one place of bodies in the plane
+        return scene.planar
     if key == "restitution":
         return law.depends_on_speed or type(law).element is not ContactLaw.element
     return False

@@ -126,7 +126,9 @@ def notes_on(grid: Grid, quantities: Mapping[str, np.ndarray]) -> dict[str, Any]
 
 
 #: keys that linear curves do not depend on
-UNFELT = re.compile(r"damper(\.[^.]+)?\.(friction|restitution|position|velocity)|cavity(\.[^.]+)?\.gap|initial\..+")
+UNFELT = re.compile(
+    r"(friction_)?damper(\.[^.]+)?\.(friction|restitution|position|velocity|normal_force)|cavity(\.[^.]+)?\.gap|initial\..+"
+)
 
 
 def linear_tops(grid: Grid) -> dict[str, np.ndarray]:

@@ -226,6 +226,6 @@ def _complex(k: int, mass: bytes, damping: bytes, stiffness: bytes) -> tuple[np.
     solved = np.linalg.solve(M, np.hstack([-K, -C]))
     values, vectors = np.linalg.eig(np.vstack([np.hstack([np.zeros((k, k)), np.eye(k)]), solved]))
     size = np.maximum(np.abs(values), np.finfo(float).eps * np.abs(values).max())
-    size *= np.sqrt(np.abs(np.einsum("ik,ij,jk->k", vectors[:k].conj(), M, vectors[:k])))
+    size *= np.sqrt(np.abs(np.einsum("ik,ik->k", vectors[:k].conj(), M @ vectors[:k])))
     vectors /= np.where(size > 0.0, size, 1.0)
     return values.astype(complex), vectors[:k], np.linalg.inv(vectors)

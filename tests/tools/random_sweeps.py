@@ -144,8 +144,13 @@ def _axes(rng: np.random.Generator, scene: Scene) -> Iterator[tuple[str, Any]]:
     yield "damper.0.velocity", lambda: rng.uniform(-1.0, 1.0)
     yield "damper.0.position", lambda: rng.uniform(-0.6, 0.6) * gap  # some beyond the wall
     yield "cavity.gap", lambda: gap * _between(rng, 0.1, 10.0)
+    yield "damper.0.mass", lambda: rng.choice([0.03, 0.1])
     if scene.structure.model == "rigid":
         yield "initial.velocity", lambda: rng.uniform(-1.0, 1.0)
+        yield "structure.stiffness", lambda: scene.structure.stiffness * rng.uniform(0.8, 1.2)
+    if scene.friction_damper:
+        yield "friction_damper.0.normal_force", lambda: _between(rng, 0.01, 1.0)
+        yield "friction_damper.friction", lambda: rng.choice([0.0, 0.3])
     if scene.structure.model != "prescribed":
         yield "excitation.force", lambda: _between(rng, 1e-4, 10.0)
 

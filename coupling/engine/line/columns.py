@@ -32,7 +32,9 @@ def columns(
     for path, numbers in values.items():
         place = entries_of(scene, path)
         assert place is not None
-        _, entries, key = place
+        table, entries, key = place
+        if table == "friction_damper":
+            continue
         if key == "gap":
             rows = _rows(whole, system, np.isin(whole.cavity, entries))
             walls = rows[np.isin(whole.surface[rows - system.friction_rows], (LEFT, RIGHT))]
@@ -43,10 +45,26 @@ def columns(
                 found.limit[:, body] = [coefficient(number) * max(pressed[body], 0.0) for number in numbers]
         elif key == "restitution":
             restitution[:, entries] = numbers[:, None]
+    if any(path.startswith("friction_damper.") for path in values):
+        _set_grip(scene, system, found, values)
     if any(path.endswith(".restitution") for path in values):
         _set_restitution(scene, whole, system, found, restitution)
     found.holds[:] = found.limit[:, : system.bodies]
     return found
+
+
+def _set_grip(scene: Scene, system: LineSystem, found: Columns, values: Mapping[str, np.ndarray]) -> None:
+    """Set the limits of the friction dampers from those of their numbers that are among some."""
+    own = {
+        key: np.tile([getattr(damper, key) for damper in scene.friction_damper], (len(found.omega), 1))
+        for key in ("friction", "normal_force")
+    }
+    for path, numbers in values.items():
+        place = entries_of(scene, path)
+        if place is not None and place[0] == "friction_damper":
+            own[place[2]][:, place[1]] = numbers[:, None]
+    grip = np.vectorize(coefficient, otypes=[float])(own["friction"]) * own["normal_force"]
+    found.limit[:, system.bodies : system.friction_rows] = grip
 
 
 def _rows(whole: System, system: LineSystem, bodies: np.ndarray) -> np.ndarray:

@@ -78,7 +78,8 @@ class EngineRun(EventDrivenRun):
 
     def whole_in(self, table: Columns, k: int) -> System:
         """Return the system of scene k."""
-        return system_in(self.whole, table, k, np.arange(self.whole.contacts))
+        system, line = system_in(self.whole, table, k, np.arange(self.whole.contacts)), self.system
+        return system._replace(grip=table.limit[k, line.bodies : line.friction_rows])
 
     def reuse(self, earlier: EngineRun) -> None:
         """Take over the flows of an earlier run of the same system."""

@@ -57,6 +57,17 @@ _POINTS = {
         },
         [{"excitation.frequency": f, "damper.friction": m} for f in (15.2, 15.9, 16.3) for m in (0.0, 0.2)],
     ),
+    "friction dampers": (
+        _RIGID | {
+            "friction_damper": [
+                {"normal_force": 2.0, "friction": 0.3, "stiffness": 1e4}, {"normal_force": 1.0, "friction": 0.1},
+            ],
+        },
+        [
+            {"friction_damper.0.normal_force": n, "friction_damper.friction": m, "excitation.frequency": f}
+            for n in (0.5, 2.0, 4.0) for m in (0.0, 0.2, 0.4) for f in (15.2, 16.3)
+        ],
+    ),
     "a body in flight, a structure that friction holds": (
         _ONE | {
             "damper": [{"cavity": "c", "mass": 0.05, "position": 2e-3}],
