@@ -255,6 +255,10 @@ def _coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray
         left = np.linalg.solve(product, left)
     if condition > NEARLY_EQUAL:
         left += left @ (np.eye(2 * k) - right.T @ left)  # the parts of modes that nearly coalesce must cancel
+    # one of each pair serves, twice: what it has of the other's by round-off would not cancel
+    one, other = np.flatnonzero(values.imag > 0), np.flatnonzero(values.imag < 0)
+    left[one] = (left[one] + left[other].conj()) / 2
+    left[other] = left[one].conj()
     return values, shapes, left
 
 
