@@ -198,6 +198,8 @@ def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point
     """
     row = _row(head)
     point = corrected(head, step, known, row)
+    if point is None and row is not head.tangent:
+        point = corrected(head, step, known)
     if known and (point is None or point.passage.sequence != head.passage.sequence):
         other = corrected(head, step, (), row)
         point = other if other and other.passage.sequence == head.passage.sequence else point
