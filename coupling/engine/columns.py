@@ -112,7 +112,7 @@ def _pulled(scene: Scene) -> bool:
 
 
 def tells(path: str) -> bool:
-    """Return whether more than its column tells a number above zero from zero: friction has other linear modes."""
+    """Return whether zero needs another subsystem than values above it: without friction linear modes differ."""
     return path.endswith(".friction")
 
 
