@@ -40,7 +40,7 @@ from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
 #: periods up to which blocks run without a check: it takes some 1500 periods of a block where tilts persist, and at
-#: five points of a sweep, where they do not, 2500 to 8000 (docs/bodies.md)
+#: five points of a sweep, where they do not, 2500 to 8000 (docs/which_body.md)
 WORTH = 6_000
 #: relative error of the mean amplitude that is allowed unless a body says otherwise
 TOLERANCE = 0.05
