@@ -77,9 +77,9 @@ def _pass_segment(room, eq, turns, flows, walk, trace, i):
     if at[FLOW] >= 0:
         M, outcome = after_event(room, eq, turns, flows, walk, trace, i, f, z)
     else:
-        if eq.law and at[LAW_OF] != 0 and trace.first[0] < trace.first[1]:
+        if eq.law and i == 0 and at[LAW_OF] != 0 and trace.first[0] < trace.first[1]:
             return WANTS_LAW
-        M = first_derivative(room, eq, turns, flows, walk, trace, f, z)
+        M = first_derivative(room, eq, turns, flows, walk, trace, i, f, z)
         outcome = KNOWN if at[SMOOTH] else UNTRUSTED
     if outcome > UNTRUSTED or room.used[2] != 0:
         return outcome

@@ -27,11 +27,15 @@ _NEAR, _ROUND_OFF = 1e-9, 1e-13
 
 
 @counting
-def first_derivative(room, eq, turns, flows, walk, trace, f, z):
-    """Return the derivative (2N, C) of z as the first segment begins, in flow f."""
-    one, size, k = len(eq.unit), len(eq.root), len(eq.scale)
+def first_derivative(room, eq, turns, flows, walk, trace, start, f, z):
+    """Return the derivative (2N, C) of z as segment `start` begins, in flow f, by the state there.
+
+    Where that is not the first, at the end of a period, the motion only passes: what a run that begins there does is no
+    kink of it.
+    """
+    one, k = len(eq.unit), len(eq.scale)
     given = times(room, eq.from_state, walk.given)
-    M = _placed(room, eq, turns, walk, trace, z)
+    M = _placed(room, eq, turns, walk, trace, start, z)
     far = 0.0
     for i in range(eq.modes):
         far = max(far, eq.typical[i])
@@ -39,11 +43,32 @@ def first_derivative(room, eq, turns, flows, walk, trace, f, z):
         # of the largest mode: the bodies may move others by more than what the loads let expect of them
         if abs(z[i] - given[i]) > SHUT * far:
             worsen(walk, GRAZING)  # the structure would begin beyond a stop
-    meets = False
+    if start == 0:
+        _begin_run(room, eq, turns, flows, walk, trace, f, z, given, M)
+    for i in range(one):
+        for c in range(M.shape[1]):
+            walk.unheld[i, c] = M[i, c] * (eq.scale[c] if c < k else 1.0)
+    M = applied(room, begun(room, eq, turns, trace.state[start], closed_at(room, eq, trace, start), z), M)
+    idle = matrix(room, one, M.shape[1])
+    for i in range(one):
+        for c in range(M.shape[1]):
+            idle[i, c] = eq.from_state[i, c] * eq.scale[c] if c < k else M[i, c]
+            M[i, c] *= eq.scale[c] if c < k else 1.0
+    check_idle(room, eq, turns, walk, trace, start, idle, z)
+    return M
+
+
+@counting
+def _begin_run(room, eq, turns, flows, walk, trace, f, z, given, M):
+    """Change the derivative M (2N, C) of the start, a state u `given` (2N,), by what a run does there at once.
+
+    Notes whether other starts have a kink there.
+    """
+    size, k, meets = len(eq.root), len(eq.scale), False
     for h in range(trace.first[0], trace.first[1]):
         r = trace.struck[h]
         if trace.impulse[0, r] != 0.0:
-            row = eq.speed[r, :one]
+            row = eq.speed[r, : len(eq.unit)]
             meets = meets or abs(dot(row, given)) > SLOW * dot_abs(row, given)
     if meets:
         worsen(walk, GRAZING)  # an impact at the very start, which another state has a period before
@@ -60,21 +85,10 @@ def first_derivative(room, eq, turns, flows, walk, trace, f, z):
         room, eq, turns, flows, walk, trace, f, z, M
     ):
         worsen(walk, GRAZING)
-    for i in range(one):
-        for c in range(M.shape[1]):
-            walk.unheld[i, c] = M[i, c] * (eq.scale[c] if c < k else 1.0)
-    M = applied(room, begun(room, eq, turns, trace.state[0], closed_at(room, eq, trace, ZERO), z), M)
-    idle = matrix(room, one, M.shape[1])
-    for i in range(one):
-        for c in range(M.shape[1]):
-            idle[i, c] = eq.from_state[i, c] * eq.scale[c] if c < k else M[i, c]
-            M[i, c] *= eq.scale[c] if c < k else 1.0
-    check_idle(room, eq, turns, walk, trace, ZERO, idle, z)
-    return M
 
 
 @counting
-def _placed(room, eq, turns, walk, trace, z):
+def _placed(room, eq, turns, walk, trace, start, z):
     """Return the derivative (2N, k + P) of u that a run begins with: bodies in walls are moved out of them.
 
     Springs of friction dampers are unloaded to their bounds.
@@ -98,12 +112,12 @@ def _placed(room, eq, turns, walk, trace, z):
             own[i, p] = dot(turns.from_state[p, i], state)
     pushed, count = integers(room, bodies), 0
     for b in range(bodies):
-        slip, s = trace.q[0, eq.along[b]] - dot(eq.floor[b], trace.q[0]), 2 * eq.modes + b
+        slip, s = trace.q[start, eq.along[b]] - dot(eq.floor[b], trace.q[start]), 2 * eq.modes + b
         if abs(slip - walk.given[s]) > SHUT * eq.travel[b]:
             pushed[count] = s
             count += 1
     if count > 0:
-        _push(room, eq, turns, trace, z, kept, own, pushed[:count])
+        _push(room, eq, turns, trace, start, z, kept, own, pushed[:count])
     found = product(room, eq.from_state, kept)
     for i in range(one):
         for p in range(P):
@@ -112,7 +126,7 @@ def _placed(room, eq, turns, walk, trace, z):
 
 
 @counting
-def _push(room, eq, turns, trace, z, kept, own, pushed):
+def _push(room, eq, turns, trace, start, z, kept, own, pushed):
     """Let gaps of bodies that were pushed, states (m,) of their slips, stay closed where they are closed now."""
     k, one, shut = len(eq.scale), len(eq.unit), 0
     gap, rows = matrix(room, eq.contacts, k), integers(room, eq.contacts)
@@ -124,7 +138,7 @@ def _push(room, eq, turns, trace, z, kept, own, pushed):
         moves = False
         for m in range(len(pushed)):
             moves = moves or gap[shut, pushed[m]] != 0.0
-        if moves and abs(eq.rest[r] + dot(eq.J[r], trace.q[0])) <= SHUT * eq.play[r]:
+        if moves and abs(eq.rest[r] + dot(eq.J[r], trace.q[start])) <= SHUT * eq.play[r]:
             rows[shut] = r
             shut += 1
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -23,6 +24,7 @@ from vanedamp.coupling.derivatives.walking import (
     KEEPS,
     KNOWN,
     LAW_OF,
+    LOST,
     NEAR_CODE,
     NEAR_UNIT,
     NEXT,
@@ -233,6 +235,47 @@ class PassageWalk:
         return len(flows)
 
 
+def periods_from(
+    dynamics: Dynamics, state: np.ndarray, periods: int, earlier: list[EventRun]
+) -> Iterator[tuple[np.ndarray, np.ndarray, PassageStatus]]:
+    """Yield the state (k,) at the end of every period of a motion, its derivative (k, k) by that at the period's start.
+
+    And its defect: what makes none, ends the motion. One run passes all periods; earlier: as of `run_from`, and the one
+    that is left. Derivatives are as those of a passage of one period, but that a run begins there is no kink.
+    """
+    frame = dynamics.frame
+    made = _Made(table_of(dynamics, None), state, None, False, None)
+    made.until(np.inf, False)
+    run = run_from(frame, state, periods, *earlier)
+    earlier[:], done = [run], 0
+
+    def ended(state: np.ndarray) -> tuple[np.ndarray, np.ndarray, PassageStatus]:
+        agrees = end_walk(*made.records(trace), state, float(done + 1))
+        found = made.derivatives(made.before(trace, made.done - 1), done + 1)[0]
+        return state, found if agrees else np.full_like(found, np.nan), made.status
+
+    for part, trace in enumerate(run.course(periods, made.segments)):
+        if part:
+            made.turn()
+        count = int(trace.at[COUNT])
+        while True:
+            of_period = made.done + int(np.searchsorted(trace.period[made.done : count], done, side="right"))
+            trace.at[COUNT] = of_period
+            made.walk(trace)
+            trace.at[COUNT] = count
+            if of_period == count:
+                break
+            there = frame.to_state @ np.concatenate([trace.q[of_period], trace.v[of_period]])
+            yield ended(there)
+            done += 1
+            made.begin(there)
+    final = run.final() if run.status is Status.OK else None
+    if final is None:
+        yield np.full(len(state), np.nan), np.full((len(state), len(state)), np.nan), PassageStatus.STOPPED
+    else:
+        yield ended(frame.state_of(final))
+
+
 class _Made:
     """The derivative of a passage as it is made in compiled code, with what Python finds for that.
 
@@ -246,14 +289,21 @@ class _Made:
         self.flows = list[Flow]()
         k, keeps = len(state), watch is not None
         self._walk = walk = table.walking(keeps)
-        walk.at[:], walk.shifted[:], walk.shift[:], walk.turns[:], walk.reach[:] = 0, 0, 0.0, 0.0, 0.0
-        walk.at[FLOW] = walk.at[LAW_OF] = -1
+        walk.at[:], walk.turns[:] = 0, 0.0
         walk.at[COUNTS], walk.at[GIVEN] = (k, 1) if given else (0, 0)
-        walk.at[SEEKS], walk.at[KEEPS], walk.at[SMOOTH] = watch is None or watch.nears, keeps, 1
-        walk.given[:], walk.last[0], walk.took_part[:], walk.clearance[0] = state, -np.inf, -np.inf, np.inf
+        walk.at[SEEKS], walk.at[KEEPS] = watch is None or watch.nears, keeps
         if turns is not None:
             walk.turns[:] = turns
-        walk.size[:], walk.reach[:, 0] = table.least, table.reach
+        self.begin(state)
+
+    def begin(self, state: np.ndarray) -> None:
+        """Begin a passage with the next segment of the course, in a state (k,)."""
+        walk = self._walk
+        walk.shifted[:], walk.shift[:], walk.reach[:] = 0, 0.0, 0.0
+        walk.at[FLOW] = walk.at[LAW_OF] = -1
+        walk.at[STATUS], walk.at[COMPLETED], walk.at[LOST], walk.at[SMOOTH] = 0, 0, 0, 1
+        walk.given[:], walk.last[0], walk.took_part[:], walk.clearance[0] = state, -np.inf, -np.inf, np.inf
+        walk.size[:], walk.reach[:, 0] = self._table.least, self._table.reach
 
     @property
     def segments(self) -> int:

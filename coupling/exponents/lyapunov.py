@@ -141,16 +141,16 @@ def _exponents(
     found = _Found(frozen(()), frozen(()), Motion.UNDECIDED, 0, 0)
     while len(derivatives) < periods and not found.settled:
         # as many again each time, so that looking at them costs less than the periods
-        for _ in range(min(max(LEAST_EXPONENTS, len(derivatives)), periods - len(derivatives))):
-            passage = motion(states[-1])
-            status = max(status, passage.status, key=order.index)
+        more, done = min(max(LEAST_EXPONENTS, len(derivatives)), periods - len(derivatives)), len(derivatives)
+        for after, derivative, own in motion.each_period(
+            states[-1], more, lambda count, done=done: progress and progress(done + count, periods)
+        ):
+            status = max(status, own, key=order.index)
             if status is not PassageStatus.OK:  # a product without this factor, or with a one-sided one, is none
                 none = frozen(())
                 return Exponents(status, Motion.UNDECIDED, none, none, 0, 0, len(derivatives), period)
-            states.append(passage.state)
-            derivatives.append(passage.scaled(motion.scale))
-            if progress is not None:
-                progress(len(derivatives), periods)
+            states.append(after)
+            derivatives.append(derivative * (motion.scale / motion.scale[:, None]))
         found = _found(np.array(derivatives), np.array(states) / motion.scale)
     if progress is not None:
         progress(periods, periods)

@@ -19,7 +19,7 @@ from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.numbers import Numbers, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.symmetry import Symmetry
-from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, run_from
+from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, periods_from, run_from
 from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.engine.trace import COUNT
 from vanedamp.coupling.methods.registry import check_waveform
@@ -123,6 +123,21 @@ class PeriodMap:
         numbers = self._numbers if derivative else None
         walk = PassageWalk(self.dynamics, self._event_names, state, derivative, numbers, part=part, short=short)
         return walk.passage(run, periods), walk.reached
+
+    def each_period(
+        self, state: np.ndarray, periods: int, passed: Callable[[int], None] = lambda _: None
+    ) -> list[tuple[np.ndarray, np.ndarray, PassageStatus]]:
+        """Return the state after each period from a state (k,), its derivative (k, k) by that before, and its defect.
+
+        The first with a defect is the last. passed: called with the number of periods done.
+        """
+        found = list[tuple[np.ndarray, np.ndarray, PassageStatus]]()
+        for one in periods_from(self.dynamics, state, periods, self.earlier):
+            found.append(one)
+            passed(len(found))
+            if one[2] is not PassageStatus.OK:
+                break
+        return found
 
     def at(self, value: float) -> PeriodMap:
         """Return the map with the parameter at a value. Raises InputError for a value that makes it no scene."""

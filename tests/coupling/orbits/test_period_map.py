@@ -12,6 +12,7 @@ from tests.tools.closed_form_scenes import ball, period_one_start, rubbing, scen
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_reduced, random_scene
 from tests.tools.sensitive_scenes import KINDS, numbers_of, scene_of
 from vanedamp.coupling.derivatives.passage import PassageStatus
+from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import InputError
@@ -449,3 +450,22 @@ def test_passages_do_not_depend_on_those_before(seed, tmp_path):
             assert again.status is fresh.status and again.crossings == fresh.crossings
             for name in ("state", "derivative", "by_number", "peaks"):
                 assert np.array_equal(getattr(again, name), getattr(fresh, name), equal_nan=True)
+
+
+@pytest.mark.parametrize(("seed", "periods"), [(0, 12), (2, 12), (4, 12), (5, 12), (9, 12), (17, 150)])
+def test_periods_of_one_run_are_passages(seed, periods, tmp_path):
+    """Derivatives that begin anew at the end of every period are those of runs that begin there."""
+    scene = choose(scene_of(seed, tmp_path)[1]).scene
+    along = period_map(scene)
+    state, compared, sizes = along.state_of(simulate(scene).final), 0, along.scale / along.scale[:, None]
+    for after, derivative, status in along.each_period(state, periods):
+        passage = along(state)
+        # where a run that begins there has a kink, the motion may have none
+        assert status is PassageStatus.OK or passage.status is not PassageStatus.OK
+        if status is PassageStatus.OK and passage.status is PassageStatus.OK:
+            size = max(1.0, np.abs(passage.derivative * sizes).max())
+            assert np.abs((passage.derivative - derivative) * sizes).max() < 1e-7 * size
+            assert np.abs((passage.state - after) / along.scale).max() < 1e-9 * size
+            compared += 1
+        state = after
+    assert compared >= 0.9 * periods

@@ -142,10 +142,10 @@ def test_what_breaks_has_none(monkeypatch):
     broken = sweep(scene(sweep=AXES | {"sections": 3, "exponents": 32}, structure=critical, **BODY))
     assert all(status.startswith("error") for status in broken.status.flat)
     assert (broken.exponents["motion"] == "").all() and np.isnan(broken.sections["section_slip"]).all()
-    find = module.PeriodMap.__call__
+    find = module.PeriodMap.each_period
     monkeypatch.setattr(
-        module.PeriodMap, "__call__",
-        lambda own, state: find(own, state)._replace(status=PassageStatus.UNDETERMINED),
+        module.PeriodMap, "each_period",
+        lambda *given: [(*found[:2], PassageStatus.UNDETERMINED) for found in find(*given)],
     )  # fmt: skip
     found = sweep(kept(exponents=32)).exponents
     assert (found["exponent_status"] == "undetermined").all() and np.isnan(found["exponent"]).all()
