@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -141,10 +142,9 @@ def _exponents(
     found = _Found(frozen(()), frozen(()), Motion.UNDECIDED, 0, 0)
     while len(derivatives) < periods and not found.settled:
         # as many again each time, so that looking at them costs less than the periods
-        more, done = min(max(LEAST_EXPONENTS, len(derivatives)), periods - len(derivatives)), len(derivatives)
-        for after, derivative, own in motion.each_period(
-            states[-1], more, lambda count, done=done: progress and progress(done + count, periods)
-        ):
+        more = min(max(LEAST_EXPONENTS, len(derivatives)), periods - len(derivatives))
+        report = None if progress is None else partial(_report, progress, len(derivatives), periods)
+        for after, derivative, own in motion.each_period(states[-1], more, report):
             status = max(status, own, key=order.index)
             if status is not PassageStatus.OK:  # a product without this factor, or with a one-sided one, is none
                 none = frozen(())
@@ -158,6 +158,10 @@ def _exponents(
         status, found.motion, frozen(found.exponents / period), frozen(found.confidence / period), found.repeats,
         found.neutral, len(derivatives), period,
     )  # fmt: skip
+
+
+def _report(progress: Callable[[int, int], None], before: int, periods: int, count: int) -> None:
+    progress(before + count, periods)
 
 
 class _Found(NamedTuple):

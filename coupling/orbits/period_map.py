@@ -125,7 +125,7 @@ class PeriodMap:
         return walk.passage(run, periods), walk.reached
 
     def each_period(
-        self, state: np.ndarray, periods: int, passed: Callable[[int], None] = lambda _: None
+        self, state: np.ndarray, periods: int, passed: Callable[[int], None] | None = None
     ) -> list[tuple[np.ndarray, np.ndarray, PassageStatus]]:
         """Return the state after each period from a state (k,), its derivative (k, k) by that before, and its defect.
 
@@ -134,7 +134,8 @@ class PeriodMap:
         found = list[tuple[np.ndarray, np.ndarray, PassageStatus]]()
         for one in periods_from(self.dynamics, state, periods, self.earlier):
             found.append(one)
-            passed(len(found))
+            if passed is not None:
+                passed(len(found))
             if one[2] is not PassageStatus.OK:
                 break
         return found
