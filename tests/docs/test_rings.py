@@ -63,7 +63,7 @@ def test_page_shows_what_the_command_prints(capsys):
     assert main(["ring", str(ROOT / "docs" / "examples" / "ring.toml")]) == 0
     printed = capsys.readouterr().out.splitlines()
     page = (DOCS / "howto" / "ring.md").read_text(encoding="utf-8")
-    block = page.partition("    natural frequencies in Hz")[2].partition("- **Say")[0]
+    block = page.partition("    natural frequencies in Hz")[2].partition("- **Give")[0]
     shown = ("    natural frequencies in Hz" + block).rstrip().splitlines()
     assert len(shown) == 10
     assert {line[4:] for line in shown} - {"..."} <= set(printed)
