@@ -185,7 +185,8 @@ class Study(NamedTuple):
     @classmethod
     def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> Study:
         """Return the study in the tables of a TOML file that lies at `path`, which errors name. Raises InputError."""
-        file = file_in(StudyFile, tables, "optimise", "say what is best in an [optimise] table (docs/optimisation.md)", path)
+        remedy = "say what is best in an [optimise] table (docs/optimisation.md)"
+        file = file_in(StudyFile, tables, "optimise", remedy, path)
         table, scene = file.optimise, scene_in(file)
         for number in scene.ranges:
             raise InputError(f"{path}: {number}: a range is for `vanedamp run` and `vanedamp sweep`; give [tolerances]")
