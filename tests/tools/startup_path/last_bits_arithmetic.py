@@ -190,7 +190,12 @@ def _whole(matrix, lower):
 
 
 def _solve(function, a, b, *rest, **options):
-    a, b = _matrix(a), np.asarray(b)
+    a, b = np.asarray(a), np.asarray(b)
+    if a.ndim > 2 and a.size and b.ndim >= a.ndim - 1 and a.shape[:-2] == b.shape[: a.ndim - 2]:
+        # of a stack each by itself, as LAPACK does: another size of a neighbour changes nothing
+        pairs = zip(a.reshape(-1, *a.shape[-2:]), b.reshape(-1, *b.shape[a.ndim - 2 :]), strict=True)
+        return np.reshape([_solve(function, *pair, *rest, **options) for pair in pairs], b.shape)
+    a = _matrix(a)
     if not _plain(a) or a.shape[-1] != a.shape[-2]:
         return function(a, b, *rest, **options)
     vector = b.ndim == 1 or b.ndim == a.ndim - 1
