@@ -33,8 +33,8 @@ from vanedamp.studies.demo.curve import Curve, curves
 from vanedamp.studies.demo.figure_file import FigureScenes
 from vanedamp.studies.demo.figure_study import FigureStudy, Read, Session, print_claims, write_scene, written
 from vanedamp.studies.demo.figure_study import study as figure_study
+from vanedamp.studies.jobs.workers import workers
 from vanedamp.studies.report.claims import Claim, Study
-from vanedamp.studies.workers import workers
 
 
 def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None, resume: bool = False) -> list[Study]:

@@ -7,7 +7,7 @@ many of these are left out, whether the peak lies at an edge of the range, and w
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
@@ -220,3 +220,13 @@ def _step(x: np.ndarray, place: float) -> float:
         return float(np.abs(x - place).min())
     left, right = np.searchsorted(x, place, "left"), np.searchsorted(x, place, "right")
     return float(np.diff(x[max(left - 1, 0) : right + 1]).max(initial=0.0))
+
+
+def cavity_lines(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how the rigid model's mode moves the cavities, with the keys of [[cavity]]."""
+    for label, motion in result["cavity"].items():
+        yield (
+            f"cavity {label}: moves by {motion['along']:.4g} of {result['rigid']['at']}, normal_motion = "
+            f"{without_round_off(motion['normal_motion']):.5g}, rotation = "
+            f"{without_round_off(motion['rotation']):.5g} rad/m"
+        )

@@ -14,8 +14,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep as run_sweep
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.jobs.workers import workers as processes
 from vanedamp.studies.terminal import Bar
-from vanedamp.studies.workers import workers as processes
 
 T = TypeVar("T")
 

@@ -21,7 +21,8 @@ _DISPLAY: ContextVar[_Lines | Bar | _Alone | None] = ContextVar("display", defau
 def progress(title: str) -> Iterator[Callable[[int, int], None]]:
     """Show progress on standard error, with rate and time left: a bar on a terminal, elsewhere a line every 30 s.
 
-    The clock starts with the first call: what was done before, or compiled, says nothing of the rate.
+    The clock starts with the first call: what was done before, or compiled, says nothing of the rate. Stages before it
+    are named by themselves.
     """
     show = Bar(title) if sys.stderr.isatty() else _Lines(title)
     before = _DISPLAY.set(show)
@@ -92,11 +93,13 @@ class Bar:
         """Take the title, and options of tqdm."""
         self.title, self.stage, self.look = title, "", {"leave": False} | look
         self.bar: Any = None
+        self.before = _Alone()
 
     def __call__(self, done: int, total: int) -> None:
         if self.bar is None:
             from tqdm import tqdm
 
+            self.before.enter("")
             self.bar = tqdm(desc=self._title(), total=total, initial=done, **self.look)
         self.bar.total = total
         self.bar.update(done - self.bar.n)
@@ -109,6 +112,8 @@ class Bar:
         before, self.stage = self.stage, title
         if self.bar is not None:
             self.bar.set_description(self._title())
+        else:
+            self.before.enter(title)
         return before
 
     def close(self) -> None:
@@ -123,16 +128,18 @@ class _Lines:
     def __init__(self, title: str) -> None:
         self.title, self.stage = title, ""
         self.started = self.said = 0.0
-        self.before: int | None = None
+        self.first: int | None = None
+        self.before = _Alone()
 
     def __call__(self, done: int, total: int) -> None:
         now = time.monotonic()
-        if self.before is None:
-            self.before, self.started, self.said = done, now, now
+        if self.first is None:
+            self.before.enter("")
+            self.first, self.started, self.said = done, now, now
         if now - self.said < _PATIENCE or done == total:
             return
         self.said = now
-        rate = (done - self.before) / (now - self.started)
+        rate = (done - self.first) / (now - self.started)
         left = f", {rate:.3g} per second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
         stage = f", {self.stage}" if self.stage else ""
         _print(f"{self.title}{stage}: {done} of {total}{left}")
@@ -140,6 +147,8 @@ class _Lines:
     def enter(self, title: str) -> str:
         """Name a stage in the lines that follow. Returns the one before."""
         before, self.stage = self.stage, title
+        if self.first is None:
+            self.before.enter(title)
         return before
 
     def close(self) -> None:

@@ -30,7 +30,7 @@ from benchmarks.sweep.worker import Job, scene
 from benchmarks.timing import format_spread, spread
 from vanedamp.coupling.sweep.checkpoint import Checkpoint
 from vanedamp.files.store import write_json
-from vanedamp.studies.workers import available_cores
+from vanedamp.studies.jobs.workers import available_cores
 
 TARGET, MOST_MB = 0.95, 120
 _MODULE = "benchmarks.sweep.worker"

@@ -33,7 +33,7 @@ from vanedamp.coupling.sweep.sweep import sweep, warm_up
 from vanedamp.coupling.sweep.worker import SweepTable, Task, TaskResult, run_points
 from vanedamp.files.store import write_json
 from vanedamp.files.toml_input import validate
-from vanedamp.studies.workers import workers
+from vanedamp.studies.jobs.workers import workers
 
 #: the calibrated cluster of the demonstration
 _MASS, _STIFFNESS, _AMPLITUDE = 0.148, 3.4e7, 3.0e-5

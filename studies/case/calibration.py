@@ -129,6 +129,10 @@ class Calibration:
             **arrays,
         )  # fmt: skip
 
+    def save(self, path: str | Path) -> None:
+        """Write the record to HDF5."""
+        self.record.save(path)
+
     def to_json(self) -> dict[str, Any]:
         """Return the result as plain data."""
         record = self.record

@@ -84,7 +84,7 @@ COMMANDS = (
             resume,
         ),
         writes={"output": _RECORD, "picture": (".png",)}, checkpoint=True,
-        reads=Function("support.cases:read_campbell_case"), takes=("case",),
+        reads=Function("support.cases:read_campbell_case"), job="campbell:CampbellJob", takes=("case",),
     ),
     Command(
         "ring", "modes of a ring of equal sectors by nodal diameter, and the engine orders that meet them", 27,
@@ -121,7 +121,7 @@ COMMANDS = (
             json_file, resume,
         ),
         writes={"output": _RECORD, "case": (".toml",), "scene": (".toml",)}, checkpoint=True, reads=_CASE,
-        takes=("case",),
+        job="calibrate:CalibrateJob", takes=("case",),
     ),
     Command(
         "matrices", "stiffness, mass, nodes and sets for other codes (Matrix Market, CSV)", 40,
@@ -180,7 +180,7 @@ COMMANDS = (
             ),
             moved_start,
         ),
-        writes={"output": _RECORD}, reads=_RANGES, takes=("scene",),
+        writes={"output": _RECORD}, reads=_RANGES, job="run:RunJob", takes=("scene",),
     ),
     Command(
         "sweep", "a run at every point of the scene's [sweep] grid", 80,
@@ -192,7 +192,8 @@ COMMANDS = (
             ),
             moved_start, resume,
         ),
-        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_RANGES, takes=("scene",),
+        writes={"output": _RECORD, "peak": (".h5",)}, checkpoint=True, reads=_RANGES,
+        job="sweep:SweepJob", takes=("scene",),
     ),
     Command(
         "explore", "sliders, and a forced response or the modes of a ring that follow them, in the browser", 85,
@@ -213,23 +214,24 @@ COMMANDS = (
         "orbits",
         "branches of periodic orbits, their stability and bifurcations, as the scene's [orbit] table says", 85,
         (input_file("SCENE.toml"), output_file("BRANCH.h5"), json_file, resume),
-        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE, takes=("scene",),
+        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE, job="orbits:OrbitsJob", takes=("scene",),
     ),
     Command(
         "ramp", "run-up and run-down through resonance, as the scene's [ramp] table says", 87,
         (input_file("SCENE.toml"), output_file("RAMP.h5"), json_file, resume),
-        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE, takes=("scene",),
+        writes={"output": _RECORD}, checkpoint=True, reads=_SCENE, job="ramp:RampJob", takes=("scene",),
     ),
     Command(
         "ringdown",
         "ring-down or hammer blow as the scene's [ring_down] table says: frequency and damping versus amplitude", 88,
         (input_file("SCENE.toml"), output_file("RINGDOWN.h5"), json_file),
-        writes={"output": _RECORD}, reads=Function("support.scenes:read_any_scene"), takes=("scene",),
+        writes={"output": _RECORD}, reads=Function("support.scenes:read_any_scene"),
+        job="ring_down:RingDownJob", takes=("scene",),
     ),
     Command(
         "optimise", "mass, gap and number of bodies that reduce most", 90,
         (input_file("STUDY.toml"), output_file("OPTIMUM.h5"), json_file, workers, resume),
-        writes={"output": _RECORD}, checkpoint=True, takes=("study",),
+        writes={"output": _RECORD}, checkpoint=True, job="optimise:OptimiseJob", takes=("study",),
     ),
     Command(
         "contact", "numbers of a contact from geometry and materials: stiffness, yield, restitution over speed", 97,
@@ -249,7 +251,7 @@ COMMANDS = (
     Command(
         "life", "how long a damper damps: wear over hours, and the response with the gaps that it opens", 92,
         (input_file("STUDY.toml"), output_file("LIFE.h5"), json_file, workers, resume),
-        writes={"output": _RECORD}, checkpoint=True, takes=("life",),
+        writes={"output": _RECORD}, checkpoint=True, job="life:LifeJob", takes=("life",),
     ),
     Command(
         "identify", "numbers of a scene, or deviations of a ring's sectors, from measurements", 95,
@@ -259,8 +261,8 @@ COMMANDS = (
             argument("--csv", metavar="FILE.csv", help="deviations by sector, as [mistuning.stiffness] reads them"),
             json_file, workers, budget, resume,
         ),
-        writes={"output": _RECORD, "scene": (".toml",), "csv": (".csv",)}, takes=("identification", "deviations"),
-        checkpoint=True,
+        writes={"output": _RECORD, "scene": (".toml",), "csv": (".csv",)}, checkpoint=True,
+        job="identify:IdentifyJob", takes=("identification", "deviations"),
     ),
     Command(
         "report", "one HTML page of results", 100,

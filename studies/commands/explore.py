@@ -15,11 +15,11 @@ from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
 from vanedamp.studies.explore.page import Exploration
 from vanedamp.studies.explore.server import has_display, serve
 from vanedamp.studies.explore.sweep_files import open_sweeps
+from vanedamp.studies.jobs.workers import available_cores
 from vanedamp.studies.kinds.ring_modes import NAME as RINGS
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
 from vanedamp.studies.scene_checks import check_moved, load_scene
-from vanedamp.studies.workers import available_cores
 
 
 def run(arguments: Namespace) -> None:

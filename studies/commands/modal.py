@@ -10,7 +10,8 @@ from typing import Any
 
 from vanedamp.studies.case.stages import assemble, modal_analysis
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.commands.support.messages import cavity_lines, write_result
+from vanedamp.studies.commands.support.messages import write_result
+from vanedamp.studies.headline import cavity_lines
 from vanedamp.studies.hot_spots import plus_minus
 
 

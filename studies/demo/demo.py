@@ -10,20 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
+from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import warm_up_engine
 from vanedamp.files.store import load
 from vanedamp.files.toml_output import write_commented
-from vanedamp.studies import sweep_steps
 from vanedamp.studies.demo import claims
 from vanedamp.studies.demo.figure_file import FOLDER, Effort, Structure
 from vanedamp.studies.demo.figure_study import MODES, FigureStudy, Read, Session, prepare, print_claims, study
 from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.jobs.sweep import peak
+from vanedamp.studies.jobs.workers import WorkerPool, available_cores
 from vanedamp.studies.report.claims import CLAIMS
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.pictures import mode_picture, summary_picture
-from vanedamp.studies.workers import WorkerPool, available_cores
 from vanedamp.studies.worst_start import STARTS
 
 
@@ -100,8 +101,11 @@ def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> P
     with _stage("the motion at a peak"):
         motion = folder / f"{MOTION}_peak.h5"
         result = Sweep.load(folder / f"{MOTION}.h5")
-        sweep_steps.run_peak(sweep_steps.prepare(result.scene, None), result, motion, print)
-        results += [motion] if motion.exists() else []
+        note, files = peak(grid(result.scene), result, motion.name)
+        print(note)
+        for write in files.values():
+            write(str(motion))
+            results.append(motion)
     _write_pipeline(folder, sources, rigid)
     from vanedamp.studies.report.page import write_report
     from vanedamp.studies.report.results import collect

@@ -15,9 +15,7 @@ from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene, relative
 from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.sweep.record import Sweep
-from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, finite, write_json
@@ -27,9 +25,8 @@ from vanedamp.studies.demo.curve import Curve, curves, worst_of
 from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureScenes, Structure
 from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.jobs.sweep import SweepJob
 from vanedamp.studies.report.claims import CLAIMS, Claim, Study
-from vanedamp.studies.sweep_steps import compile_engine, ends_of
-from vanedamp.studies.terminal import progress
 from vanedamp.studies.worst_start import STARTS
 
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
@@ -72,13 +69,11 @@ class Session:
         if not self.resume:
             clear(checkpoint)
         write_scene(scene, path.with_suffix(".toml"), f"{figure.title}{f': {curve}' if curve else ''}")
-        points = grid(scene)
-        compile_engine(ends_of(points), self.pool)
-        with progress(stem) as report:
-            found = sweep(points, self.pool, report, checkpoint, provenance(scene), moved_starts=True)
-        found.save(path)
-        clear(checkpoint)
-        return found
+        job = SweepJob(str(path), scene, provenance=provenance(scene))
+        outcome, _ = job.run(lambda: self.pool, checkpoint, stem)
+        outcome.record.save(str(path))
+        outcome.clear(checkpoint)
+        return Sweep.load(path)
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ from vanedamp.files.errors import shortened
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.explore import page, sweep_files
 from vanedamp.studies.explore.curves import Submit
+from vanedamp.studies.jobs.workers import WorkerPool
 from vanedamp.studies.report.motion_page import script_source
-from vanedamp.studies.workers import WorkerPool
 
 HOST = "127.0.0.1"
 #: of the workers: the browser draws on the same cores, and first

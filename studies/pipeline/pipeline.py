@@ -11,14 +11,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Displayed
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.jobs.workers import available_cores
+from vanedamp.studies.jobs.workers import workers as worker_processes
 from vanedamp.studies.pipeline.record import Record
 from vanedamp.studies.pipeline.stages import Stage, Tools, stages
 from vanedamp.studies.pipeline.tables import PipelineFile
-from vanedamp.studies.workers import workers as worker_processes
 
 
 @dataclass(frozen=True)
@@ -62,18 +62,16 @@ def pipeline(
     workers: int | None = None,
     dry_run: bool = False,
     note: Callable[[str], None] | None = None,
-    check_scene: Callable[[Scene, bool], None] | None = None,
 ) -> PipelineResult:
     """Run the stages of a pipeline file whose inputs have changed since their results were made.
 
     Inputs of a stage are tables of the case and the scene, files that they name, results of earlier stages,
     options, and the versions of the software; comments do not count. Finished work is kept in PIPELINE.record.json with
-    the results, so that a killed run resumes, sweeps at their last points.
+    the results, so that a killed run resumes, jobs from their checkpoints.
 
-    folder: of the results, by default the one that the file names; workers: processes of sweeps, by default one for
-    every core; dry_run: only say what would run; note: takes a line as stages begin and end; check_scene: takes every
-    scene that will run, and whether its peak runs with samples, to reject it. Raises InputError, with the stage's
-    file: nothing has run then if the file, the case or a scene is bad.
+    folder: of the results, by default the one that the file names; workers: processes of jobs, by default one for
+    every core; dry_run: only say what would run; note: takes a line as stages begin and end. Raises InputError, with
+    the stage's file: nothing has run then if the file, the case or a scene is bad, or would take a month.
     """
     started = time.perf_counter()
     table, source = PipelineFile.load(path), Path(path)
@@ -82,7 +80,7 @@ def pipeline(
         raise InputError(f"{path}: folder: {target} is a file; name a folder for the results")
     listed = list(stages(table, source, target))
     say = note or (lambda line: None)
-    _check(listed, [source, *table.named_files.values()], source, check_scene or (lambda scene, peak: None))
+    _check(listed, [source, *table.named_files.values()], source, workers or available_cores())
     record = Record(target / f"{source.stem}.record.json")
     _keep_edited(listed, record)
     if dry_run:
@@ -146,15 +144,13 @@ def _plan(listed: Sequence[Stage], record: Record, say: Callable[[str], None]) -
     return plan
 
 
-def _check(
-    listed: Sequence[Stage], files: Iterable[str | Path], source: Path, check_scene: Callable[[Scene, bool], None]
-) -> None:
+def _check(listed: Sequence[Stage], files: Iterable[str | Path], source: Path, workers: int) -> None:
     """Reject bad input before anything runs, and results that would take the place of an input."""
     inputs = {(source.parent / file).resolve() if file != source else source.resolve() for file in files}
     made: dict[Path, str] = {}
     for stage in listed:
         with _located(stage):
-            inputs |= {Path(file).resolve() for file in stage.check(check_scene)}
+            inputs |= {Path(file).resolve() for file in stage.check(workers)}
         for path in stage.outputs:
             if path in made:
                 raise InputError(

@@ -11,31 +11,36 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.scene.structures import Rom
+from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
-from vanedamp.files.store import clear_leftovers, digest, load
+from vanedamp.files.store import digest, load
 from vanedamp.files.toml_input import InputError, read_toml
 from vanedamp.studies.case.tables import Case, check_interface, without_strengths
 from vanedamp.studies.hot_spots import level_warnings
+from vanedamp.studies.jobs.job import Job, SceneJob, StudyJob
 from vanedamp.studies.pipeline.record import Inputs, plain
 from vanedamp.studies.pipeline.tables import (
     CALIBRATION,
+    JOBS,
     MODES,
     REDUCED,
     RIGID_SCENE,
     TUNED_CASE,
     IdentifyStage,
+    JobStage,
     PipelineFile,
     ReduceStage,
-    SweepStage,
 )
-from vanedamp.studies.scene_checks import check_model, check_moved, check_numbers
+from vanedamp.studies.scene_checks import check_model
 
-#: tables of a scene for other commands
-_OF_OTHERS = ("orbit", "ramp", "ring_down")
+#: tables of a scene that one job reads
+_OF_JOBS = {"sweep": "sweep", "orbits": "orbit", "ramp": "ramp", "ringdown": "ring_down"}
 #: keys of the rigid model that a scene takes
 _RIGID = ("mass", "stiffness", "damping_ratio", "base_mass")
 #: the model of a structure that the pipeline gives, and the keys of the scene's own that it replaces
@@ -80,17 +85,17 @@ class Stage(ABC):
     takes    outputs of earlier stages that it reads
     """
 
+    #: options that name the outputs of its job
+    OPTIONS: ClassVar[Sequence[str]] = ("output",)
+
     name: str
     file: Path
     outputs: tuple[Path, ...]
     takes: tuple[Path, ...]
 
     @abstractmethod
-    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
-        """Check the input before anything runs, and return the files that it names. Raises VanedampError.
-
-        check_scene: takes a scene that will run, and whether its peak runs with samples.
-        """
+    def check(self, workers: int) -> Iterable[str | Path]:
+        """Check the input before anything runs, and return the files that it names. Raises VanedampError."""
 
     @abstractmethod
     def inputs(self) -> dict[str, Any]:
@@ -100,6 +105,24 @@ class Stage(ABC):
     def work(self, tools: Tools) -> str:
         """Do it, and return the result in one line. Raises VanedampError."""
 
+    def _run(self, job: Job, tools: Tools) -> str:
+        """Run a job, with its checkpoint in the folder of the results, and write its files; as `work`."""
+        checkpoint = Path(f"{self.outputs[0]}.partial")
+        if tools.fresh:
+            clear(checkpoint)
+        tools.warn(job.warnings())
+        if finished := job.finished(checkpoint):
+            tools.note(f"{finished} points are done, the rest follows")
+        outcome, _ = job.run(tools.pool, checkpoint, self.name)
+        for option, path in zip(self.OPTIONS, self.outputs, strict=False):
+            if (write := outcome.writers.get(option)) is not None:
+                write(str(path))
+        outcome.clear(checkpoint)
+        tools.warn(outcome.warnings)
+        for note in outcome.notes:
+            tools.note(note)
+        return outcome.sentence
+
 
 @dataclass(frozen=True)
 class CaseStage(Stage):
@@ -108,7 +131,7 @@ class CaseStage(Stage):
     #: keys of the case's [calibration] that the stage reads; None: all of it, and the measurements
     CALIBRATION_KEYS: ClassVar[Sequence[str] | None] = ()
 
-    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+    def check(self, workers: int) -> Iterable[str | Path]:
         """Check the case, which a tuned one does not differ from but in numbers."""
         return [] if self.takes else [self.file, *self._checked().files]
 
@@ -133,28 +156,13 @@ class Calibrate(CaseStage):
     """From a case to its calibration, the tuned case and a scene of the rigid model."""
 
     CALIBRATION_KEYS = None
+    OPTIONS = ("output", "case", "scene")
 
     def work(self, tools: Tools) -> str:
         """Calibrate."""
-        from vanedamp.files.checkpoint_file import clear
-        from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_case
-        from vanedamp.studies.case.calibration import calibrate
+        from vanedamp.studies.jobs.calibrate import CalibrateJob
 
-        record, tuned, scene = self.outputs
-        checkpoint = f"{record}.partial"
-        if tools.fresh:
-            clear(checkpoint)
-        found = calibrate(Case.load(self.file), checkpoint)
-        found.record.save(record)
-        save_tuned_case(self.file, found, tuned)
-        save_rigid_scene(self.file, found, scene)
-        clear(checkpoint)
-        tools.warn(found.warnings)
-        rigid, factors = found.rigid, ""
-        if found.tuning is not None:
-            pairs = zip(found.tuning.names, found.tuning.factors.tolist(), strict=True)
-            factors = "; " + ", ".join(f"{name} times {factor:.4g}" for name, factor in pairs)
-        return f"{rigid.frequency_hz:.6g} Hz, damping ratio {rigid.damping_ratio:.4g}{factors}"
+        return self._run(CalibrateJob(str(self.file), Case.load(self.file)), tools)
 
 
 @dataclass(frozen=True)
@@ -216,14 +224,19 @@ class Identify(Stage):
     """From measurements to the numbers of a scene, and the scene with them."""
 
     table: IdentifyStage
+    OPTIONS = ("output", "scene")
 
-    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+    def check(self, workers: int) -> Iterable[str | Path]:
         """Check the study, and return it, its scene and the measurements."""
-        from vanedamp.studies.identification.study import IdentificationStudy
+        job = self._job()
+        job.check(workers)
+        return [self.file, *self._named(), *job.files]
 
-        study = IdentificationStudy.load(self.file)
-        check_scene(study.base, False)
-        return [self.file, *self._named(), *study.scene.files]
+    def _job(self) -> Job:
+        from vanedamp.studies.identification.study import IdentificationStudy
+        from vanedamp.studies.jobs.identify import IdentifyJob
+
+        return IdentifyJob(str(self.file), IdentificationStudy.load(self.file))
 
     def _named(self) -> list[Path]:
         """Return the files that the study names."""
@@ -240,103 +253,67 @@ class Identify(Stage):
 
     def work(self, tools: Tools) -> str:
         """Identify."""
-        from vanedamp.files.checkpoint_file import clear
-        from vanedamp.studies.identification.search import identify
-        from vanedamp.studies.terminal import progress
-
-        record, scene = self.outputs
-        checkpoint = f"{record}.partial"
-        if tools.fresh:
-            clear(checkpoint)
-        with progress(self.name) as report:
-            found = identify(self.file, tools.pool(), report, {"versions": versions()}, checkpoint)
-        found.save(record)
-        found.save_scene(scene)
-        clear(checkpoint)
-        tools.warn(found.notes)
-        return f"{found.status.value}, {found.sentence.removesuffix('.')}"
+        return self._run(self._job(), tools)
 
 
 @dataclass(frozen=True)
-class Sweep(Stage):
-    """From a scene to its sweep. products: the files of the rigid model and of the reduced one, by their kind."""
+class OnScene(Stage):
+    """A job on a scene or a study. products: the files of the rigid model and of the reduced one, by their kind."""
 
-    table: SweepStage
+    kind: str
+    table: JobStage
     products: dict[str, Path]
+    OPTIONS = ("output", "peak")
 
-    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+    def check(self, workers: int) -> Iterable[str | Path]:
         """Check the scene, on any structure of the kind where its own is not made yet."""
         if self.file in self.takes:
             return []
-        scene = Scene.of(self._tables(_ANY_RIGID, 1e-6), self.file)
-        self._check(scene)
-        check_scene(scene, self.table.peak)
+        scene = self._class().FILE.of(self._tables(_ANY_RIGID, 1e-6), self.file)
         made = {path.resolve() for path in self.takes}
         if self.table.structure is None and not made:
             check_model(scene)
+        if not isinstance(scene.structure, Rom) or Path(scene.structure.file).is_file():  # else the model is made later
+            self._job(_ANY_RIGID, 1e-6).check(workers)
         return [self.file, *(file for file in scene.files if Path(file).resolve() not in made)]
 
     def inputs(self) -> dict[str, Any]:
         """Return the scene, its changes by the pipeline, and the files that it names."""
         if not self.file.exists():
             return {}
-        scene, (rigid, amplitude) = self._scene(), self._model()
-        tables = {key: table for key, table in self._kept(read_toml(self.file)).items() if key not in _OF_OTHERS}
-        given: dict[str, Any] = {"option": {key: getattr(self.table, key) for key in ("structure", "level", "peak")}}
+        rigid, amplitude = self._model()
+        tables = self._kept(read_toml(self.file))
+        for table in {*_OF_JOBS.values()} - {_OF_JOBS.get(self.kind)}:
+            tables.pop(table, None)
+        options = [key for key in ("structure", "level", "peak") if hasattr(self.table, key)]
+        given: dict[str, Any] = {"option": {key: getattr(self.table, key) for key in options}}
         if self.table.structure == "rigid":
             given["rigid model"] = rigid
         if self.table.level is not None:
             given["fatigue level"] = {"amplitude": amplitude}
-        files = [] if scene is None else scene.files
+        there = (rigid or self.table.structure != "rigid") and (amplitude is not None or self.table.level is None)
+        files = self._class().FILE.of(self._tables(rigid, amplitude), self.file).files if there else []
         return {f"scene {self.file.name}": tables} | given | _digests(files, self.file.parent) | _software()
 
     def work(self, tools: Tools) -> str:
-        """Run the points that are not done."""
-        from vanedamp.files.checkpoint_file import clear
-        from vanedamp.studies.report.designs import designs
-        from vanedamp.studies.report.forced_response import forced_responses
-        from vanedamp.studies.sweep_steps import doubts, prepare, run_peak, run_points
+        """Run it."""
+        job = self._job(*self._model())
+        assert job.scene is not None
+        check_model(job.scene)
+        return self._run(job, tools)
 
-        scene = self._scene()
-        assert scene is not None
-        self._check(scene)
-        check_model(scene)
-        checkpoint = Path(f"{self.outputs[0]}.partial")
-        if tools.fresh:
-            clear(checkpoint)
-        prepared = prepare(scene, checkpoint, self.table.peak)
-        tools.warn(prepared.points.warnings)
-        if prepared.resumed:
-            tools.note(f"{prepared.resumed} of {prepared.points.size} points are done, the rest follows")
-        result = run_points(prepared, self.outputs[0], tools.pool(), self.name)
-        tools.warn(doubts(prepared, result))
-        if self.table.peak:
-            peak = self.outputs[1]
-            run_peak(prepared, result, peak, lambda text: tools.note(text.replace(str(peak), peak.name)))
-        clear(checkpoint)
-        clear_leftovers(self.outputs[0])
-        bad = int((result.status != "ok").sum())
-        told = f"{bad} of {result.status.size} points are not ok; " if bad else ""
-        best = [design for design in designs(forced_responses(result)) if design.worst.reference > 0]
-        return told + (best[0].sentence if best else f"{result.status.size} points")
+    def _class(self) -> type[SceneJob | StudyJob[Any]]:
+        module, _, name = JOBS[self.kind].partition(":")
+        found: type[SceneJob | StudyJob[Any]] = getattr(import_module(f"vanedamp.studies.jobs.{module}"), name)
+        return found
 
-    def _check(self, scene: Scene) -> None:
-        check_moved(scene)
-        check_numbers(scene, f"{self.file}: ")
-        if not scene.axes:
-            raise InputError(
-                'sweep: missing; name a grid, such as "excitation.frequency" = {start = 95, stop = 105, num = 11}'
-            )
-
-    def _scene(self) -> Scene | None:
-        """Return the scene on its structure; None as long as that is not made."""
-        rigid, amplitude = self._model()
-        if (self.table.structure == "rigid" and not rigid) or (self.table.level is not None and amplitude is None):
-            return None
-        return Scene.of(self._tables(rigid, amplitude), self.file)
+    def _job(self, rigid: dict[str, Any], amplitude: float | None) -> SceneJob | StudyJob[Any]:
+        """Return the job on the structure and at the level that the pipeline gives."""
+        options = dict(zip(self.OPTIONS[1:], (path.name for path in self.outputs[1:]), strict=False))
+        return self._class().of_tables(self._tables(rigid, amplitude), self.file, **options)
 
     def _tables(self, rigid: dict[str, Any], amplitude: float | None) -> dict[str, Any]:
-        """Return the scene's tables with the structure and the level that the pipeline gives."""
+        """Return the file's tables with the structure and the level that the pipeline gives."""
         tables = self._kept(read_toml(self.file))
         if self.table.structure is not None:
             reduced = {"file": str(self.products.get("reduced", REDUCED))}
@@ -385,7 +362,7 @@ class Report(Stage):
     results: tuple[Path, ...]
     title: str | None = None
 
-    def check(self, check_scene: Callable[[Scene, bool], None]) -> Iterable[str | Path]:
+    def check(self, workers: int) -> Iterable[str | Path]:
         """Return the results that are not the pipeline's."""
         return self.results
 
@@ -440,18 +417,21 @@ def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage
         files = (folder / f"{one.stem}.h5", folder / one.scene)
         yield Identify(f"identify {one.stem}", (base / one.study).resolve(), files, (), one)
         made.append(files[0])
-    for table in pipeline.sweep:
-        stage = _sweep(table, base, folder, products, pipeline)
-        yield stage
-        made += stage.outputs
+    for kind in JOBS:
+        for table in getattr(pipeline, kind):
+            stage = _on_scene(kind, table, base, folder, products, pipeline)
+            yield stage
+            made += stage.outputs
     if pipeline.report is not None:
         further = tuple(base / name for name in pipeline.report.results)
         page = folder / pipeline.report.file
         yield Report("report", page, (page,), tuple(made), further, pipeline.report.title)
 
 
-def _sweep(table: SweepStage, base: Path, folder: Path, products: dict[str, Path], pipeline: PipelineFile) -> Sweep:
-    scene = (base / table.scene).resolve()
+def _on_scene(
+    kind: str, table: JobStage, base: Path, folder: Path, products: dict[str, Path], pipeline: PipelineFile
+) -> OnScene:
+    scene = (base / table.file).resolve()
     takes = []
     if scene in [folder / name for name in pipeline.scenes_made]:
         takes.append(scene)
@@ -465,8 +445,9 @@ def _sweep(table: SweepStage, base: Path, folder: Path, products: dict[str, Path
             named = read_toml(scene).get("structure", {}).get("file")
             if isinstance(named, str) and (scene.parent / named).resolve() == products["reduced"]:
                 takes.append(products["reduced"])
-    names = [f"{table.stem}.h5"] + ([f"{table.stem}_peak.h5"] if table.peak else [])
-    return Sweep(f"sweep {table.stem}", scene, tuple(folder / name for name in names), tuple(takes), table, products)
+    names = [f"{table.stem}.h5"] + ([f"{table.stem}_peak.h5"] if getattr(table, "peak", False) else [])
+    files = tuple(folder / name for name in names)
+    return OnScene(f"{kind} {table.stem}", scene, files, tuple(takes), kind, table, products)
 
 
 def _digests(files: Iterable[str | Path], folder: Path) -> dict[str, str]:

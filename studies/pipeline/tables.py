@@ -14,6 +14,11 @@ from vanedamp.rom.basis import basis_named
 #: outputs of the stages in the folder of the results, with a file for every sweep
 CALIBRATION, TUNED_CASE, RIGID_SCENE = "calibration.h5", "tuned.toml", "rigid.toml"
 MODES, REDUCED = "modes.h5", "rom.h5"
+#: by its table, the class of a job below studies.jobs, in the order in which they run
+JOBS = {
+    "sweep": "sweep:SweepJob", "run": "run:RunJob", "orbits": "orbits:OrbitsJob", "ramp": "ramp:RampJob",
+    "ringdown": "ring_down:RingDownJob", "optimise": "optimise:OptimiseJob", "life": "life:LifeJob",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -65,26 +70,61 @@ class IdentifyStage:
         return f"{self.stem}_found.toml"
 
 
-@dataclass(frozen=True, config=STRICT)
-class SweepStage:
-    """Stage `sweep`: a run at every point of a scene's [sweep] grid."""
+@dataclass(frozen=True, config=STRICT, kw_only=True)
+class JobStage:
+    """Stage of a job on a scene, or on a study with one."""
 
-    scene: str
-    """scene file, relative to the pipeline's"""
     structure: Literal["rigid", "reduced"] | None = None
     """structure in place of the scene's own: "rigid", that of calibrate (or modal), or "reduced", that of reduce"""
     level: Literal["fatigue"] | None = None
     """"fatigue" in place of the scene's own level: the resonance without bodies reaches the case's fraction of the
     fatigue strength"""
     name: str | None = None
-    """name of the stage and of its result NAME.h5; left out: that of the scene file"""
-    peak: bool = False
-    """whether the point with the highest mean runs once more, with events and samples for the report (NAME_peak.h5)"""
+    """name of the stage and of its result NAME.h5; left out: that of the scene or study file"""
+
+    @property
+    def file(self) -> str:
+        """The name of the scene or study file."""
+        raise NotImplementedError
 
     @property
     def stem(self) -> str:
         """The name of the result file, without suffix."""
-        return self.name or Path(self.scene).stem
+        return self.name or Path(self.file).stem
+
+
+@dataclass(frozen=True, config=STRICT, kw_only=True)
+class SceneStage(JobStage):
+    """Stage of a job on a scene: `run`, `orbits`, `ramp`, `ringdown`."""
+
+    scene: str
+    """scene file, relative to the pipeline's"""
+
+    @property
+    def file(self) -> str:
+        """The name of the scene file."""
+        return self.scene
+
+
+@dataclass(frozen=True, config=STRICT, kw_only=True)
+class SweepStage(SceneStage):
+    """Stage `sweep`: a run at every point of a scene's [sweep] grid."""
+
+    peak: bool = False
+    """whether the point with the highest mean runs once more, with events and samples for the report (NAME_peak.h5)"""
+
+
+@dataclass(frozen=True, config=STRICT, kw_only=True)
+class StudyStage(JobStage):
+    """Stage of a job on a study: `optimise`, `life`."""
+
+    study: str
+    """study file, relative to the pipeline's"""
+
+    @property
+    def file(self) -> str:
+        """The name of the study file."""
+        return self.study
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -101,8 +141,7 @@ class ReportStage:
 
 @dataclass(frozen=True, config=STRICT)
 class PipelineFile:
-    """A pipeline: a stage runs if its table is there, an empty one too, in the order calibrate, modal, reduce,
-    identify, sweep, report."""
+    """A pipeline: a stage runs if its table is there, an empty one too, in the order of the keys below."""
 
     case: str | None = None
     """case file of calibrate, modal and reduce, relative to this file"""
@@ -117,7 +156,19 @@ class PipelineFile:
     identify: tuple[IdentifyStage, ...] = ()
     """numbers of scenes from measurements, one table each"""
     sweep: tuple[SweepStage, ...] = ()
-    """scenes to run, one table each"""
+    """scenes to run at every point of their [sweep], one table each"""
+    run: tuple[SceneStage, ...] = ()
+    """scenes to run at one frequency, one table each"""
+    orbits: tuple[SceneStage, ...] = ()
+    """scenes whose periodic orbits are followed, as their [orbit] says"""
+    ramp: tuple[SceneStage, ...] = ()
+    """scenes that run up and down, as their [ramp] says"""
+    ringdown: tuple[SceneStage, ...] = ()
+    """scenes that ring down, as their [ring_down] says"""
+    optimise: tuple[StudyStage, ...] = ()
+    """studies of `vanedamp optimise`"""
+    life: tuple[StudyStage, ...] = ()
+    """studies of `vanedamp life`"""
     report: ReportStage | None = None
     """one HTML page of all results"""
 
@@ -127,15 +178,25 @@ class PipelineFile:
             raise ValueError(f"case: missing; [{structural[0]}] needs a case file")
         if self.case is not None and not structural:
             raise ValueError("case: no stage takes it; give [calibrate], [modal] or [reduce], or leave it out")
-        if not (structural or self.sweep or self.identify):
+        if not (structural or self.identify or self.jobs):
             raise ValueError("sweep: missing; give a stage: [calibrate], [modal], [reduce], [[identify]] or [[sweep]]")
-        for index, one in enumerate(self.identify):
-            self._check_name(f"identify[{index}]", one)
-        for index, table in enumerate(self.sweep):
-            self._check_sweep(f"sweep[{index}]", table)
-            self._check_name(f"sweep[{index}]", table)
+        for key, one in self.identified.items():
+            self._check_name(key, one)
+        for key, table in self.jobs.items():
+            self._check_job(key, table)
+            self._check_name(key, table)
 
-    def _check_sweep(self, key: str, table: SweepStage) -> None:
+    @property
+    def jobs(self) -> dict[str, JobStage]:
+        """The tables of jobs by their keys, in the order in which they run."""
+        return {f"{kind}[{index}]": table for kind in JOBS for index, table in enumerate(getattr(self, kind))}
+
+    @property
+    def identified(self) -> dict[str, IdentifyStage]:
+        """The tables [[identify]] by their keys."""
+        return {f"identify[{index}]": table for index, table in enumerate(self.identify)}
+
+    def _check_job(self, key: str, table: JobStage) -> None:
         rigid = self.calibrate is not None or self.modal is not None
         if table.structure == "rigid" and not rigid:
             raise ValueError(f'{key}.structure: "rigid" is that of [calibrate] or [modal]; add one of these tables')
@@ -144,13 +205,12 @@ class PipelineFile:
         if table.level is not None and not rigid:
             raise ValueError(f'{key}.level: "fatigue" is that of [calibrate] or [modal]; add one of these tables')
 
-    def _check_name(self, key: str, table: SweepStage | IdentifyStage) -> None:
+    def _check_name(self, key: str, table: JobStage | IdentifyStage) -> None:
         if not table.stem or Path(table.stem).name != table.stem:
             raise ValueError(f"{key}.name: expected a file name without folder and suffix, not '{table.stem}'")
-        sweeps, others = [one.stem for one in self.sweep], [one.stem for one in self.identify]
-        if (sweeps + others).count(table.stem) > 1:
-            kind = "stages" if table.stem in others else "sweeps"
-            raise ValueError(f"{key}.name: two {kind} have the name '{table.stem}'; give one of them another")
+        stems = [one.stem for one in self.jobs.values()] + [one.stem for one in self.identify]
+        if stems.count(table.stem) > 1:
+            raise ValueError(f"{key}.name: two stages have the name '{table.stem}'; give one of them another")
 
     @classmethod
     def load(cls, path: str | Path) -> PipelineFile:
@@ -164,8 +224,9 @@ class PipelineFile:
     @property
     def named_files(self) -> dict[str, str]:
         """The files that it names, by their keys."""
-        studies = {f"identify[{index}].study": table.study for index, table in enumerate(self.identify)}
-        scenes = {f"sweep[{index}].scene": table.scene for index, table in enumerate(self.sweep)}
+        studies = {f"{key}.study": table.study for key, table in self.identified.items()}
+        scenes = {f"{key}.{'study' if isinstance(table, StudyStage) else 'scene'}": table.file
+                  for key, table in self.jobs.items()}  # fmt: skip
         further = {} if self.report is None else {f"report.results[{i}]": n for i, n in enumerate(self.report.results)}
         return ({} if self.case is None else {"case": self.case}) | studies | scenes | further
 

@@ -16,8 +16,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.commands.support.budget import scenes_of
 from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.jobs.budget import scenes_of
 from vanedamp.studies.optimisation.study import Study
 
 

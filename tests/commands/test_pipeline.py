@@ -406,7 +406,7 @@ def test_the_points_of_another_scene_are_not_taken(killed):
         ("pipeline.toml", "modes = 3", 'basis = "craig"', "pipeline.toml: reduce: basis"),
         ("pipeline.toml", "[reduce]\nmodes = 3", "", "reduced.toml: structure.file: no such file"),
         ("pipeline.toml", "[calibrate]\n[modal]", "", 'sweep[0].structure: "rigid" is that of [calibrate] or [modal]'),
-        ("pipeline.toml", '"own.toml"', '"own.toml"\nname = "gaps"', "two sweeps have the name 'gaps'"),
+        ("pipeline.toml", '"own.toml"', '"own.toml"\nname = "gaps"', "two stages have the name 'gaps'"),
         ("pipeline.toml", '"own.toml"', '"own.toml"\nname = "rom"', "reduce and sweep rom both write rom.h5"),
         ("pipeline.toml", 'folder = "out"', 'folder = "gaps.toml"', "pipeline.toml: folder: gaps.toml is a file"),
         ("case.toml", "poisson = 0.3", "poisson = 0.6", "case.toml: material.default.poisson: should be less than 0.5"),

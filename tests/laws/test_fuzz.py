@@ -15,9 +15,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies import sweep_steps
-from vanedamp.studies.commands import optimise as optimise_command
-from vanedamp.studies.commands import run as run_command
+from vanedamp.studies.jobs import job
 
 
 @pytest.fixture
@@ -33,8 +31,7 @@ def folder(tmp_path, monkeypatch):
     rows = [f"{f},{z.real},{z.imag}" for f, z in zip(frequencies, response, strict=True)]
     (tmp_path / "frf.csv").write_text("frequency,real,imaginary\n" + "\n".join(rows))
     monkeypatch.chdir(tmp_path)
-    for command in (run_command, sweep_steps, optimise_command):
-        monkeypatch.setattr(command, "progress", patient)
+    monkeypatch.setattr(job, "progress", patient)
     explicit = PRESCRIBED | {"solver": {"method": "penalty"}}
     for scene in (SCENE, ROM_SCENE, PRESCRIBED, explicit):  # compiled functions take a minute once
         simulate(validate(Scene, scene, "warm-up"))

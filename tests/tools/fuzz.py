@@ -214,9 +214,8 @@ def run_all(first: int, count: int, folder: Path) -> int:
     from vanedamp.coupling.simulation import simulate
     from vanedamp.files.toml_input import validate
     from vanedamp.modal import measurements
-    from vanedamp.studies import sweep_steps
     from vanedamp.studies.cli import main
-    from vanedamp.studies.commands import optimise, ramp, ringdown, run
+    from vanedamp.studies.jobs import job
 
     explicit = PRESCRIBED | {"solver": {"method": "penalty"}}
     for scene in (SCENE, PRESCRIBED, explicit):  # compiled functions are loaded once
@@ -255,8 +254,7 @@ def run_all(first: int, count: int, folder: Path) -> int:
         _, wrong = fuzz_runs.run_cases(range(1), prepare)
     if wrong:
         raise RuntimeError(f"the samples cannot be written: {wrong}")
-    for command in (run, sweep_steps, optimise, ramp, ringdown):  # samples are written to their end
-        command.progress = fuzz_runs.patient  # type: ignore[attr-defined]
+    job.progress = fuzz_runs.patient  # type: ignore[assignment]  # samples are written to their end
     numbers = range(first, first + count)
     faults = 0
     for title, case in (("damaged files", file_case), ("inputs", input_case)):

@@ -24,14 +24,15 @@ def argument(*names: str, **options: Any) -> Argument:
 
 @dataclass(frozen=True)
 class Function:
-    """A function at a place, module:name, below studies.commands, which is imported when it is called."""
+    """A function or class at a place, module:name, below studies.commands, which is imported when it is called."""
 
     place: str
+    below: str = "commands"
 
     def load(self) -> Callable[..., Any]:
         """Return the function."""
         module, _, name = self.place.partition(":")
-        loaded: Callable[..., Any] = getattr(import_module(f"vanedamp.studies.commands.{module}"), name)
+        loaded: Callable[..., Any] = getattr(import_module(f"vanedamp.studies.{self.below}.{module}"), name)
         return loaded
 
     def __call__(self, *given: Any) -> Any:
@@ -51,6 +52,7 @@ class Command:
     reads                 a function of the arguments that loads and checks the input, before the work is loaded
     takes                 kinds of its input files, by their names in `studies.file_kinds`
     module                whose function `run` does the work, of the arguments and what `reads` returns; "": NAME's
+    job                   in place of it a class of a job, module:name below studies.jobs
     """
 
     NAME: str
@@ -61,12 +63,13 @@ class Command:
     checkpoint: bool = False
     reads: Callable[[Namespace], Any] | None = None
     module: str = ""
+    job: str = ""
     takes: tuple[str, ...] = ()
 
     @property
     def work(self) -> Function:
-        """The function that does the work."""
-        return Function(f"{self.module or self.NAME}:run")
+        """The function that does the work, or the class of its job."""
+        return Function(self.job, "jobs") if self.job else Function(f"{self.module or self.NAME}:run")
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Declare the arguments."""
@@ -82,7 +85,10 @@ class Command:
             Function("support.outputs:prepare")(arguments, self.writes, self.checkpoint)
         try:
             given = () if self.reads is None else (self.reads(arguments),)
-            self.work(arguments, *given)
+            if self.job:
+                Function("support.jobs:run")(arguments, self.work.load(), *given)
+            else:
+                self.work(arguments, *given)
         except VanedampError:
             self._refuse_other_kinds(arguments)
             raise

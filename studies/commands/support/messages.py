@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import sys
-import time
 from argparse import Namespace
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from types import MappingProxyType
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
-from vanedamp.coupling.response.response import Response
-from vanedamp.files.checkpoint_file import clear
-from vanedamp.files.store import clear_leftovers, finite, json_text, together, write_json
-from vanedamp.studies.headline import without_round_off
+from vanedamp.files.store import finite, json_text, together, write_json
 
 
 def write_result(
@@ -22,7 +17,7 @@ def write_result(
     warnings: Collection[str] = (),
     **files: Callable[[str], object],
 ) -> None:
-    """Write the results of a command. All files appear together, or none; then its checkpoint has served.
+    """Write the results of a command. All files appear together, or none.
 
     result: as JSON to the file of `--json`, or to standard output (-), which takes nothing else then
     lines: for people, on standard output
@@ -44,22 +39,6 @@ def write_result(
     if target != "-":
         for line in lines:
             print(line)
-    if getattr(arguments, "checkpoint", None) is not None:
-        clear(arguments.checkpoint)
-        clear_leftovers(arguments.output)
-
-
-def write_timed(
-    arguments: Namespace, record: Any, started: float, summary: Callable[[Any, float], Iterable[str]],
-    warnings: Collection[str] = (), more: Mapping[str, Any] = MappingProxyType({}),
-) -> None:  # fmt: skip
-    """Write the results of a command that has worked on a record since `started` (time.perf_counter).
-
-    summary: lines of the record and the seconds, which the record does not keep: it is the same however it came about.
-    """
-    seconds = time.perf_counter() - started
-    data = record.to_json() | {"wall_time_s": seconds} | dict(more)
-    write_result(arguments, data, summary(record, seconds), warnings, output=record.save)
 
 
 def print_note(source: str, message: str) -> None:
@@ -71,21 +50,3 @@ def print_warnings(source: str, warnings: Iterable[str]) -> None:
     """Print warnings about an input file."""
     for warning in warnings:
         print_note(source, f"warning: {warning}")
-
-
-def wear_lines(response: Response) -> Iterator[str]:
-    """Yield the wear of the contacts of a response that wear: volume, depth, work rate."""
-    for one in response.wear or ():
-        if one.volume_rate:
-            depth = "" if one.depth_rate is None else f", {1e9 * one.depth_rate:.4g} nm/h"
-            yield f"{'wear':26} {one.name}: {one.volume_rate:.4g} m^3/h{depth}, work rate {one.work_rate:.4g} W"
-
-
-def cavity_lines(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield how the rigid model's mode moves the cavities, with the keys of [[cavity]]."""
-    for label, motion in result["cavity"].items():
-        yield (
-            f"cavity {label}: moves by {motion['along']:.4g} of {result['rigid']['at']}, normal_motion = "
-            f"{without_round_off(motion['normal_motion']):.5g}, rotation = "
-            f"{without_round_off(motion['rotation']):.5g} rad/m"
-        )

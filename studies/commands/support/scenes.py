@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.resonance import chosen_resonance
-from vanedamp.studies.commands.support.messages import print_note, print_warnings
+from vanedamp.studies.commands.support.messages import print_note
 from vanedamp.studies.scene_checks import check_moved, load_scene
 
 
@@ -36,16 +35,6 @@ def read_any_scene(arguments: Namespace, ranges: bool = False) -> Scene:
     scene = load_scene(arguments.input, ranges)
     arguments.outputs.keep(scene.files)
     return scene
-
-
-def print_choices(
-    source: str, estimate: Mapping[str, Any] | None, advice: Mapping[str, Any] | None, warnings: Iterable[str]
-) -> None:
-    """Print which model `modes = "auto"` and which bodies `shape = "auto"` have chosen and why, and warnings."""
-    for key, chosen in (("structure.modes", estimate), ("damper.shape", advice)):
-        if chosen is not None:
-            print_note(source, f"{key}: {chosen['sentence']}")
-    print_warnings(source, warnings)
 
 
 def print_resonance(source: str, scene: Scene) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.system.line_system import line_system
 from vanedamp.files.extensions import ExtensionError
 from vanedamp.files.toml_input import InputError, Positive, validate
-from vanedamp.studies.commands.support.budget import check_run
+from vanedamp.studies.jobs.budget import check_run
 
 # -- the method
 

@@ -21,7 +21,7 @@ from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.schedule import TaskSize
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.sweep.worker import SweepError
-from vanedamp.studies.workers import WorkerPool, workers
+from vanedamp.studies.jobs.workers import WorkerPool, workers
 
 LINKED = {"continuation": {"direction": "up"}}
 PROGRAM = """
@@ -103,7 +103,7 @@ def end_at_once(*_):
 
 def test_workers_that_end_as_they_begin_end_a_sweep(monkeypatch):
     """Whatever they are to run, it is no fault of a point."""
-    monkeypatch.setattr("vanedamp.studies.workers._begin", end_at_once)
+    monkeypatch.setattr("vanedamp.studies.jobs.workers._begin", end_at_once)
     with WorkerPool(1) as pool, pytest.raises(SweepError, match=r"^the workers end as they begin"):
         sweep(scene(), pool)
     with pytest.raises(SweepError, match=r"^the workers end as they begin"), workers(2):
@@ -140,7 +140,7 @@ def test_a_pool_that_is_gone_is_told(monkeypatch, tmp_path):
 
 ORPHANS = """
 import os, time
-from vanedamp.studies.workers import WorkerPool
+from vanedamp.studies.jobs.workers import WorkerPool
 
 if __name__ == "__main__":
     pool = WorkerPool(2)
@@ -170,11 +170,11 @@ def running(process):
 
 SHARED = """
 import os, sys
-from vanedamp.studies.workers import WorkerPool
+from vanedamp.studies.jobs.workers import WorkerPool
 
 def found():
     threads = len(os.listdir("/proc/self/task")) - 1  # one waits for the end of the parent
-    return os.getppid(), "vanedamp.studies.preloaded" in sys.modules, threads, os.environ["OMP_NUM_THREADS"]
+    return os.getppid(), "vanedamp.studies.jobs.preloaded" in sys.modules, threads, os.environ["OMP_NUM_THREADS"]
 
 if __name__ == "__main__":
     os.environ["OMP_NUM_THREADS"] = "2"
@@ -195,7 +195,7 @@ def test_workers_are_forks_of_a_server_without_threads(tmp_path):
 
 def test_the_server_of_workers_compiles_nothing(tmp_path):
     """Nobody could interrupt it."""
-    code = "import sys, vanedamp.studies.preloaded; print('vanedamp.coupling.sweep.sweep' in sys.modules)"
+    code = "import sys, vanedamp.studies.jobs.preloaded; print('vanedamp.coupling.sweep.sweep' in sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", code], env=environment(NUMBA_CACHE_DIR=str(tmp_path)), capture_output=True, text=True,
         check=False,

@@ -26,7 +26,7 @@ from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.identification.summary import noise_texts
 from vanedamp.studies.identification.tables import Number, SearchTable
-from vanedamp.studies.workers import WorkerPool
+from vanedamp.studies.jobs.workers import WorkerPool
 
 QUICK = SearchTable(candidates=8, starts=1)
 

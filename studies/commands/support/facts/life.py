@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vanedamp.studies.commands.support.budget import check_life
 from vanedamp.studies.commands.support.facts.scene import facts_of
 from vanedamp.studies.facts import Fact
+from vanedamp.studies.jobs.budget import check_life
+from vanedamp.studies.jobs.workers import available_cores
 from vanedamp.studies.life.study import LifeStudy
-from vanedamp.studies.workers import available_cores
 
 
 def facts(path: str | Path) -> list[Fact]:

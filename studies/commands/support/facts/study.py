@@ -9,12 +9,12 @@ import numpy as np
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import Points
 from vanedamp.coupling.system.transient import timed
-from vanedamp.studies.commands.support.budget import check_optimise, designs_of, scenes_of
 from vanedamp.studies.commands.support.facts.scene import facts_of
 from vanedamp.studies.commands.support.trial import mean_cost, tried
 from vanedamp.studies.facts import Fact
+from vanedamp.studies.jobs.budget import check_optimise, designs_of, scenes_of
+from vanedamp.studies.jobs.workers import available_cores
 from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
-from vanedamp.studies.workers import available_cores
 
 
 def facts(path: str | Path) -> list[Fact]:

@@ -2,38 +2,48 @@
 
 from __future__ import annotations
 
-import time
-from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.headline import format_margin
-from vanedamp.studies.terminal import progress
+from vanedamp.studies.jobs.job import Job, Means, Outcome
 
 #: columns (modes) and rows (speeds) that are printed at most
 _MOST_COLUMNS, _MOST_ROWS = 12, 25
 
 
-def run(arguments: Namespace, case: Case) -> None:
-    """Compute the diagram."""
-    started = time.perf_counter()
-    structure = assemble(case)
-    with progress("campbell") as report:
-        diagram = campbell_diagram(structure, report, arguments.checkpoint)
-    seconds = time.perf_counter() - started
-    warnings = [*diagram.warnings, *unit_doubts(structure)]
+@dataclass(frozen=True)
+class CampbellJob(Job):
+    """Computes the diagram of a case."""
 
-    def picture(path: str) -> None:
-        from vanedamp.studies.kinds.campbell.picture import campbell_picture  # matplotlib, for this file only
+    case: Case
+    TITLE: ClassVar[str] = "campbell"
 
-        campbell_picture(diagram, Path(path))
+    @property
+    def files(self) -> Iterable[str | Path]:
+        """The case's files."""
+        return self.case.files
 
-    result = diagram.to_json() | {"warnings": warnings, "wall_time_s": seconds}
-    write_result(arguments, result, _summary(diagram, seconds), warnings, output=diagram.save, picture=picture)
+    def work(self, means: Means) -> Outcome:
+        """Compute it."""
+        structure = assemble(self.case)
+        diagram = campbell_diagram(structure, means.report, means.checkpoint)
+        warnings = [*diagram.warnings, *unit_doubts(structure)]
+
+        def picture(path: str) -> None:
+            from vanedamp.studies.kinds.campbell.picture import campbell_picture  # matplotlib, for this file only
+
+            campbell_picture(diagram, Path(path))
+
+        sentence = f"{len(diagram.modes)} modes, {len(diagram.crossings)} crossings with engine orders"
+        data = {"warnings": warnings}
+        return Outcome(diagram, partial(_summary, diagram), sentence, (), warnings, {"picture": picture}, data)
 
 
 def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:

@@ -2,39 +2,50 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
 
 from vanedamp.coupling.quantities.stress import MEASURES
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ring_down import ring_down
 from vanedamp.coupling.transients.ring_down_record import RingDown
 from vanedamp.coupling.transients.ring_down_start import free_scene, table_of
-from vanedamp.files.provenance import versions
-from vanedamp.studies.commands.support.budget import check_run
-from vanedamp.studies.commands.support.messages import write_result
-from vanedamp.studies.commands.support.scenes import print_choices, print_resonance
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.hot_spots import plus_minus, strength_lines
-from vanedamp.studies.sweep_steps import compile_engine
-from vanedamp.studies.terminal import progress
+from vanedamp.studies.jobs.budget import check_run
+from vanedamp.studies.jobs.job import Means, Outcome, SceneJob, choice_notes
+from vanedamp.studies.scene_checks import check_numbers
 
 #: rows of the table that is printed
 _ROWS = 10
 
 
-def run(arguments: Namespace, scene: Scene) -> None:
-    """Let the scene ring down."""
-    table = table_of(scene)
-    check_run(free_scene(scene, table))
-    if table.start == "steady":
-        check_run(scene)
-    resonance = print_resonance(arguments.input, scene)
-    compile_engine([scene])
-    with progress("ringdown") as report:
-        result = ring_down(scene, report, {"versions": versions()})
-    print_choices(arguments.input, result.estimate, result.advice, result.warnings)
-    write_result(arguments, result.to_json() | resonance, _summary(result), output=result.save)
+@dataclass(frozen=True)
+class RingDownJob(SceneJob):
+    """Lets a scene ring down."""
+
+    TITLE: ClassVar[str] = "ringdown"
+
+    @classmethod
+    def check_scene(cls, scene: Scene, source: str) -> None:
+        """Raise InputError for a scene without [ring_down]; nothing else need move it."""
+        check_numbers(scene, source)
+        table_of(scene)
+
+    def check(self, workers: int) -> None:
+        """Reject a ring-down, or a run before it, that takes a month."""
+        table = table_of(self.of)
+        check_run(free_scene(self.of, table))
+        if table.start == "steady":
+            check_run(self.of)
+
+    def work(self, means: Means) -> Outcome:
+        """Let it ring down."""
+        result = ring_down(self.of, means.report, means.provenance)
+        linear, notes = result.linear, tuple(choice_notes(result.estimate, result.advice))
+        sentence = f"mode {linear.mode}, {linear.frequency:.6g} Hz: {len(result.half_cycles.time)} half cycles"
+        return Outcome(result, lambda _: _summary(result), sentence, notes, result.warnings)
 
 
 def _summary(result: RingDown) -> Iterator[str]:

@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
-import time
-from argparse import Namespace
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
 
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.orbits import orbits
-from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.provenance import versions
-from vanedamp.studies.commands.support.budget import check_run
-from vanedamp.studies.commands.support.messages import write_timed
-from vanedamp.studies.commands.support.scenes import print_resonance
-from vanedamp.studies.sweep_steps import compile_engine
-from vanedamp.studies.terminal import progress
+from vanedamp.studies.jobs.budget import check_run
+from vanedamp.studies.jobs.job import Means, Outcome, SceneJob
 
 
-def run(arguments: Namespace, scene: Scene) -> None:
-    """Follow the branches."""
-    check_run(scene)
-    resonance = print_resonance(arguments.input, scene)
-    started = time.perf_counter()
-    compile_engine([scene])
-    with progress("orbits") as report:
-        result = orbits(scene, report, arguments.checkpoint, {"versions": versions()})
-    write_timed(arguments, result, started, _summary, result.warnings, resonance)
+@dataclass(frozen=True)
+class OrbitsJob(SceneJob):
+    """Follows branches of periodic orbits."""
+
+    TITLE: ClassVar[str] = "orbits"
+
+    def check(self, workers: int) -> None:
+        """Reject a run before the branch that takes a month."""
+        check_run(self.of)
+
+    def work(self, means: Means) -> Outcome:
+        """Follow the branches."""
+        result = orbits(self.of, means.report, means.checkpoint, means.provenance)
+        count = sum(len(branch.parameter) for branch in result.branches)
+        sentence = f"{count} orbits on {len(result.branches)} branches"
+        return Outcome(result, partial(_summary, result), sentence, warnings=result.warnings)
 
 
 def _summary(result: Branches, seconds: float) -> Iterator[str]:

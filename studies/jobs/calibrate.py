@@ -2,27 +2,50 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar
 
 from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_case
-from vanedamp.studies.case.calibration import calibrate
+from vanedamp.studies.case.calibration import Calibration, calibrate
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.commands.support.messages import cavity_lines, write_result
+from vanedamp.studies.headline import cavity_lines
 from vanedamp.studies.hot_spots import plus_minus
+from vanedamp.studies.jobs.job import Job, Means, Outcome, Write
 
 
-def run(arguments: Namespace, case: Case) -> None:
-    """Update the model, and find damping, rigid model and excitation."""
-    calibration = calibrate(case, arguments.checkpoint)
-    result = calibration.to_json()
-    write_result(
-        arguments, result, _summary(result), calibration.warnings, output=calibration.record.save,
-        case=partial(save_tuned_case, arguments.input, calibration),
-        scene=partial(save_rigid_scene, arguments.input, calibration),
-    )  # fmt: skip
+@dataclass(frozen=True)
+class CalibrateJob(Job):
+    """Updates the model of a case, and finds damping, rigid model and excitation."""
+
+    case: Case
+    TITLE: ClassVar[str] = "calibrate"
+
+    @property
+    def files(self) -> Iterable[str | Path]:
+        """The case's files."""
+        return self.case.files
+
+    def work(self, means: Means) -> Outcome:
+        """Calibrate."""
+        found = calibrate(self.case, means.checkpoint)
+        result = found.to_json()
+        files: dict[str, Write] = {
+            "case": partial(save_tuned_case, self.source, found),
+            "scene": partial(save_rigid_scene, self.source, found),
+        }
+        return Outcome(found, lambda _: _summary(result), _sentence(found), (), found.warnings, files)
+
+
+def _sentence(found: Calibration) -> str:
+    """Return frequency, damping and factors of the tuned numbers."""
+    rigid, factors = found.rigid, ""
+    if found.tuning is not None:
+        pairs = zip(found.tuning.names, found.tuning.factors.tolist(), strict=True)
+        factors = "; " + ", ".join(f"{name} times {factor:.4g}" for name, factor in pairs)
+    return f"{rigid.frequency_hz:.6g} Hz, damping ratio {rigid.damping_ratio:.4g}{factors}"
 
 
 def _summary(result: Mapping[str, Any]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Loaded once by the server from which the workers of a pool are forked (studies.workers): the engine, compiled.
+"""Loaded once by the server from which the workers of a pool are forked (studies.jobs.workers): the engine, compiled.
 
 Workers share its memory until one writes there. It loads compiled code and compiles nothing: that
 would take a minute in which it could not be interrupted, and the first worker does it just as well.

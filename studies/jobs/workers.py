@@ -22,7 +22,7 @@ from vanedamp.files.interrupts import uninterrupted
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: modules that the server of workers loads before it forks the first one
-_PRELOADED = "vanedamp.studies.preloaded"
+_PRELOADED = "vanedamp.studies.jobs.preloaded"
 
 
 class WorkerPool(Executor):

@@ -2,30 +2,45 @@
 
 from __future__ import annotations
 
-import time
-from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.transients.ramp import ramp
 from vanedamp.coupling.transients.ramp_course import ramped
 from vanedamp.coupling.transients.ramp_record import Ramp
-from vanedamp.files.provenance import versions
-from vanedamp.studies.commands.support.messages import write_timed
-from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.hot_spots import plus_minus, strength_lines
-from vanedamp.studies.sweep_steps import compile_engine
-from vanedamp.studies.terminal import progress
+from vanedamp.studies.jobs.job import Means, Outcome, SceneJob
 
 
-def run(arguments: Namespace, scene: Scene) -> None:
-    """Run the scene up and down."""
-    resonance = print_resonance(arguments.input, ramped(scene))
-    started = time.perf_counter()
-    compile_engine([ramped(scene)])
-    with progress("ramp") as report:
-        result = ramp(scene, report, {"versions": versions()}, arguments.checkpoint)
-    write_timed(arguments, result, started, _summary, result.warnings, resonance)
+@dataclass(frozen=True)
+class RampJob(SceneJob):
+    """Runs a scene up and down."""
+
+    TITLE: ClassVar[str] = "ramp"
+
+    @classmethod
+    def check_scene(cls, scene: Scene, source: str) -> None:
+        """Raise InputError for a scene without [ramp]."""
+        super().check_scene(scene, source)
+        ramped(scene)
+
+    def compiled(self) -> Iterable[Scene]:
+        """Return the scene with a phase of its own, as ramps run it."""
+        return (ramped(self.of),)
+
+    def work(self, means: Means) -> Outcome:
+        """Run it."""
+        result = ramp(self.of, means.report, means.provenance, means.checkpoint)
+        return Outcome(result, partial(_summary, result), _sentence(result), warnings=result.warnings)
+
+
+def _sentence(result: Ramp) -> str:
+    """Return the largest peak of all runs."""
+    top = max(result.runs, key=lambda run: run.peak)
+    return f"largest peak {top.peak:.5g} m at {top.at_peak('frequency'):.6g} Hz, {top.direction}"
 
 
 def _summary(result: Ramp, seconds: float) -> Iterator[str]:

@@ -1,0 +1,32 @@
+"""A job by its command: notes before and after it, worker processes, its files, and its checkpoint."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from contextlib import ExitStack
+from typing import Any
+
+from vanedamp.studies.commands.support.messages import print_note, print_warnings, write_result
+from vanedamp.studies.commands.support.scenes import print_resonance
+from vanedamp.studies.jobs.job import Job
+from vanedamp.studies.jobs.workers import available_cores, workers
+
+
+def run(arguments: Namespace, kind: type[Job], *given: Any) -> None:
+    """Run the job of a command line, of what the command has read. Raises VanedampError."""
+    job = kind.of_arguments(arguments, *given)
+    arguments.outputs.keep(job.files)
+    count = getattr(arguments, "workers", None)
+    job.check(count or available_cores())
+    for note in job.notes():
+        print_note(job.source, note)
+    print_warnings(job.source, job.warnings())
+    resonance = {} if job.scene is None else print_resonance(job.source, job.scene)
+    checkpoint = getattr(arguments, "checkpoint", None)
+    with ExitStack() as stack:
+        outcome, seconds = job.run(lambda: stack.enter_context(workers(count)), checkpoint)
+    for note in outcome.notes:
+        print_note(job.source, note)
+    data, lines = outcome.to_json(seconds) | resonance, outcome.lines(seconds)
+    write_result(arguments, data, lines, outcome.warnings, **outcome.writers)
+    outcome.clear(checkpoint)

@@ -1,0 +1,276 @@
+"""A long command: its input, its checks, its work and what comes of it. A command runs one, or a stage of a pipeline.
+
+A job is one class in a file of its own, named in `studies.commands.declarations`, and in `studies.pipeline.tables` if
+a pipeline may hold it.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar
+
+from vanedamp.coupling.model_order.choices import leaves_open
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.sweep import warm_up
+from vanedamp.files.checkpoint_file import clear
+from vanedamp.files.provenance import versions
+from vanedamp.files.store import clear_leftovers
+from vanedamp.studies.scene_checks import check_moved, check_numbers
+from vanedamp.studies.terminal import progress, stage
+
+#: takes the path of a file and writes it
+Write = Callable[[str], object]
+
+
+class Record(Protocol):
+    """A result with a file and JSON."""
+
+    def save(self, path: str) -> object:
+        """Write the file."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
+
+
+class Means(NamedTuple):
+    """What a job works with.
+
+    pool: worker processes, None: this process; report: called with the parts done, and of all; checkpoint: a file to
+    which finished parts are written and from which the same job resumes, None: nowhere; provenance: of the result.
+    """
+
+    pool: Executor | None
+    report: Callable[[int, int], None]
+    checkpoint: Path | None
+    provenance: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a job.
+
+    record     the result
+    lines      for people, of the seconds that it took
+    sentence   the result in one line
+    notes      about choices that were made, on standard error
+    warnings   about the input
+    files      further files by the options that name them; `output` is the record's unless it is here
+    data       JSON in addition to the record's, or in its place
+    ran        points that ran now, of a job that counts them
+    unfinished whether the checkpoint stays, for the same command to go on from
+    """
+
+    record: Record
+    lines: Callable[[float], Iterable[str]]
+    sentence: str
+    notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+    files: Mapping[str, Write] = field(default_factory=dict)
+    data: Mapping[str, Any] = field(default_factory=dict)
+    ran: int | None = None
+    unfinished: bool = False
+
+    def to_json(self, seconds: float) -> dict[str, Any]:
+        """Return the result for machines. The record is the same however it came about, its time is not in it."""
+        rate = {} if self.ran is None else {"points_per_second": self.ran / seconds}
+        return {"wall_time_s": seconds} | rate | self.record.to_json() | dict(self.data)
+
+    @property
+    def writers(self) -> dict[str, Write]:
+        """What writes each file, by the option that names it."""
+        own: dict[str, Write] = {"output": self.record.save}
+        return own | dict(self.files)
+
+    def clear(self, checkpoint: Path | None) -> None:
+        """Remove a checkpoint once the files are safe, unless the same command is to go on from it."""
+        if checkpoint is not None and not self.unfinished:
+            clear(checkpoint)
+            clear_leftovers(checkpoint.with_suffix(""))
+
+
+@dataclass(frozen=True)
+class Job(ABC):
+    """A long command with its input, which has been read.
+
+    source: the input file, which errors and notes name.
+    """
+
+    source: str
+
+    #: of its progress
+    TITLE: ClassVar[str]
+    #: whether it takes worker processes
+    PARALLEL: ClassVar[bool] = False
+
+    @classmethod
+    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+        """Return the job of a command line and of what the command has read. Raises InputError."""
+        return cls(arguments.input, *given)
+
+    @classmethod
+    def of_tables(cls, tables: Mapping[str, Any], path: Path, **options: Any) -> Self:
+        """Return the job of the tables of an input file at a path, with fields of its own. Raises InputError."""
+        raise NotImplementedError
+
+    @property
+    @abstractmethod
+    def files(self) -> Iterable[str | Path]:
+        """The files that the input names."""
+
+    @property
+    def scene(self) -> Scene | None:
+        """The scene that it runs; None without one."""
+        return None
+
+    def check(self, workers: int) -> None:  # noqa: B027
+        """Reject what takes too long or too much memory. Raises InputError."""
+
+    def notes(self) -> Iterable[str]:
+        """Return what to say before it runs."""
+        return ()
+
+    def warnings(self) -> Iterable[str]:
+        """Return warnings before it runs."""
+        return ()
+
+    def finished(self, checkpoint: Path | None) -> int:
+        """Return the number of parts in a checkpoint. Raises InputError for one of another input.
+
+        Jobs whose work begins with their checkpoint leave that to it.
+        """
+        return 0
+
+    def compiled(self) -> Iterable[Scene]:
+        """Return scenes whose engine is compiled before the clock of the progress starts."""
+        return () if self.scene is None else (self.scene,)
+
+    @abstractmethod
+    def work(self, means: Means) -> Outcome:
+        """Do it. Raises VanedampError."""
+
+    def run(
+        self, pool: Callable[[], Executor | None] = lambda: None, checkpoint: Path | None = None, title: str = ""
+    ) -> tuple[Outcome, float]:
+        """Compile the engine, and do the work with its progress shown. Returns what came of it, and its time, s.
+
+        pool: returns worker processes, which are slow to start, once the checkpoint is known to belong to the job.
+        """
+        self.finished(checkpoint)
+        processes = pool() if self.PARALLEL else None
+        started = time.perf_counter()
+        compile_engine(self.compiled(), processes)
+        with progress(title or self.TITLE) as report:
+            outcome = self.work(Means(processes, report, checkpoint, {"versions": versions()}))
+        return outcome, time.perf_counter() - started
+
+
+@dataclass(frozen=True)
+class SceneJob(Job):
+    """A job on a scene."""
+
+    of: Scene
+    #: the record of its input file
+    FILE: ClassVar[type[Scene]] = Scene
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+        return self.of
+
+    @property
+    def files(self) -> Iterable[str | Path]:
+        """The scene's files."""
+        return self.of.files
+
+    @classmethod
+    def of_tables(cls, tables: Mapping[str, Any], path: Path, **options: Any) -> Self:
+        """Return the job on the scene in the tables of a file. Raises InputError."""
+        scene = Scene.of(dict(tables), path)
+        cls.check_scene(scene, f"{path}: ")
+        return cls(str(path), scene, **options)
+
+    @classmethod
+    def check_scene(cls, scene: Scene, source: str) -> None:
+        """Raise InputError for a scene that the job does not take."""
+        check_moved(scene)
+        check_numbers(scene, source)
+
+
+class Study(Protocol):
+    """A scene, and what is sought with it."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+
+    @classmethod
+    def load(cls, path: str | Path) -> Study:
+        """Read the file."""
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> Study:
+        """Return the study in the tables of a file."""
+
+
+S = TypeVar("S", bound=Study)
+
+
+@dataclass(frozen=True)
+class StudyJob(Job, Generic[S]):
+    """A job on a study; STUDY: its class."""
+
+    study: S
+    STUDY: ClassVar[type[Study]]
+    #: the record of its input file
+    FILE: ClassVar[type[Scene]]
+    PARALLEL: ClassVar[bool] = True
+
+    @property
+    def scene(self) -> Scene:
+        """The study's scene."""
+        return self.study.scene
+
+    @property
+    def files(self) -> Iterable[str | Path]:
+        """The scene's files."""
+        return self.scene.files
+
+    @classmethod
+    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+        """Read the study."""
+        return cls(arguments.input, cls.STUDY.load(arguments.input))  # type: ignore[arg-type]
+
+    @classmethod
+    def of_tables(cls, tables: Mapping[str, Any], path: Path, **options: Any) -> Self:
+        """Return the job on the study in the tables of a file. Raises InputError."""
+        return cls(str(path), cls.STUDY.of(tables, path), **options)  # type: ignore[arg-type]
+
+
+def compile_engine(scenes: Iterable[Scene], pool: Executor | None = None) -> None:
+    """Compile the engine that scenes need, which a progress that begins afterwards does not count.
+
+    Left out are scenes with open choices, which decide what is compiled.
+    """
+    title = "load the engine; the first time it is compiled, which takes a minute or two"
+    with stage(title), suppress(BrokenExecutor):  # a scene that ends its worker does so again
+        for scene in scenes:
+            if leaves_open(scene):
+                continue
+            if pool is None:
+                warm_up(scene)
+            else:
+                pool.submit(warm_up, scene).result()
+
+
+def choice_notes(estimate: Mapping[str, Any] | None, advice: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield which model `modes = "auto"` and which bodies `shape = "auto"` have chosen, and why."""
+    for key, chosen in (("structure.modes", estimate), ("damper.shape", advice)):
+        if chosen is not None:
+            yield f"{key}: {chosen['sentence']}"
