@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.scene.structures import Rom
 from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, load
@@ -269,11 +268,13 @@ class OnScene(Stage):
         """Check the scene, on any structure of the kind where its own is not made yet."""
         if self.file in self.takes:
             return []
-        scene = self._class().FILE.of(self._tables(_ANY_RIGID, 1e-6), self.file)
+        kind = self._class()
+        scene = kind.FILE.of(self._tables(_ANY_RIGID, 1e-6), self.file)
         made = {path.resolve() for path in self.takes}
         if self.table.structure is None and not made:
             check_model(scene)
-        if not isinstance(scene.structure, Rom) or Path(scene.structure.file).is_file():  # else the model is made later
+        # a study measures its model, which may be made later
+        if issubclass(kind, SceneJob) or (self.table.structure is None and not made):
             self._job(_ANY_RIGID, 1e-6).check(workers)
         return [self.file, *(file for file in scene.files if Path(file).resolve() not in made)]
 
