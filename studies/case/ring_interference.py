@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -24,12 +25,14 @@ def ring_interference(
     operating: tuple[float, float] | None = None,
     orders: Sequence[int] | None = None,
     report: Callable[[int, int], None] | None = None,
+    checkpoint: str | Path | None = None,
 ) -> Interference:
     """Return the interference of the modes of a structure's ring with engine orders.
 
     operating: lowest and highest speed, rad/s, by default those of [campbell], or 5 % about that of [rotation];
     orders: by default those of [campbell], or 1 to the number of sectors; report: called with the number of diameters
-    done, and of all, for the Campbell diagram. Raises InputError for an engine order that is no whole number.
+    done, and of all, for the Campbell diagram; checkpoint: of its solutions (campbell_diagram). Raises InputError for
+    an engine order that is no whole number.
     """
     table, rotation = structure.case.campbell, structure.case.rotation
     given = orders or (table.engine_orders if table else ()) or ()
@@ -44,7 +47,7 @@ def ring_interference(
     if table is None:
         return found
     wanted = replace(table, modes=int(modes.families.max()) + 1, engine_orders=found.orders)
-    diagram = campbell_diagram(replace(structure, case=replace(structure.case, campbell=wanted)), report)
+    diagram = campbell_diagram(replace(structure, case=replace(structure.case, campbell=wanted)), report, checkpoint)
     rows = {pair: row for row, pair in enumerate(_pairs(modes))}
     curves = [rows.get(pair) for pair in _pairs(diagram)]
     over = np.full((len(modes), len(diagram.speeds)), np.nan)

@@ -108,9 +108,10 @@ COMMANDS = (
                 "--family", type=family_count, default=1, metavar="N",
                 help="family, from 1, around whose frequencies amplification counts (default: %(default)s)",
             ),
+            resume,
         ),
-        writes={"output": _RECORD, "picture": (".png",), "mistuning": _RECORD},
-        reads=Function("support.cases:read_ring_case"), takes=("case",),
+        writes={"output": _RECORD, "picture": (".png",), "mistuning": _RECORD}, checkpoint=True,
+        reads=Function("support.cases:read_ring_case"), job="ring:RingJob", takes=("case",),
     ),
     Command(
         "calibrate", "tune to measurements; rigid model, damping ratio and excitation", 30,

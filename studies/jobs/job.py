@@ -14,7 +14,7 @@ from concurrent.futures import BrokenExecutor, Executor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.scene.scene import Scene
@@ -203,39 +203,20 @@ class SceneJob(Job):
         check_numbers(scene, source)
 
 
-class Study(Protocol):
-    """A scene, and what is sought with it."""
-
-    @property
-    def scene(self) -> Scene:
-        """The scene."""
-
-    @classmethod
-    def load(cls, path: str | Path) -> Study:
-        """Read the file."""
-
-    @classmethod
-    def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> Study:
-        """Return the study in the tables of a file."""
-
-
-S = TypeVar("S", bound=Study)
-
-
 @dataclass(frozen=True)
-class StudyJob(Job, Generic[S]):
-    """A job on a study; STUDY: its class."""
+class StudyJob(Job):
+    """A job on a study, a scene and what is sought with it; STUDY: its class; FILE: the record of its input file."""
 
-    study: S
-    STUDY: ClassVar[type[Study]]
-    #: the record of its input file
+    study: Any
+    STUDY: ClassVar[Any]
     FILE: ClassVar[type[Scene]]
     PARALLEL: ClassVar[bool] = True
 
     @property
     def scene(self) -> Scene:
         """The study's scene."""
-        return self.study.scene
+        scene: Scene = self.study.scene
+        return scene
 
     @property
     def files(self) -> Iterable[str | Path]:
@@ -245,12 +226,12 @@ class StudyJob(Job, Generic[S]):
     @classmethod
     def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
         """Read the study."""
-        return cls(arguments.input, cls.STUDY.load(arguments.input))  # type: ignore[arg-type]
+        return cls(arguments.input, cls.STUDY.load(arguments.input))
 
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any], path: Path, **options: Any) -> Self:
         """Return the job on the study in the tables of a file. Raises InputError."""
-        return cls(str(path), cls.STUDY.of(tables, path), **options)  # type: ignore[arg-type]
+        return cls(str(path), cls.STUDY.of(tables, path), **options)
 
 
 def compile_engine(scenes: Iterable[Scene], pool: Executor | None = None) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.jobs.budget import check_life
@@ -16,11 +16,11 @@ from vanedamp.studies.life.study import LifeFile, LifeStudy
 
 
 @dataclass(frozen=True)
-class LifeJob(StudyJob[LifeStudy]):
+class LifeJob(StudyJob):
     """Integrates the wear."""
 
     TITLE: ClassVar[str] = "life"
-    STUDY: ClassVar[type[LifeStudy]] = LifeStudy
+    STUDY: ClassVar[Any] = LifeStudy
     FILE: ClassVar[type[Scene]] = LifeFile
 
     def check(self, workers: int) -> None:

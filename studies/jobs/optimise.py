@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.jobs.budget import check_optimise
@@ -16,11 +16,11 @@ from vanedamp.studies.optimisation.study import Study, StudyFile
 
 
 @dataclass(frozen=True)
-class OptimiseJob(StudyJob[Study]):
+class OptimiseJob(StudyJob):
     """Searches for the best damper."""
 
     TITLE: ClassVar[str] = "optimise"
-    STUDY: ClassVar[type[Study]] = Study
+    STUDY: ClassVar[Any] = Study
     FILE: ClassVar[type[Scene]] = StudyFile
 
     def check(self, workers: int) -> None:

@@ -303,12 +303,12 @@ class OnScene(Stage):
         check_model(job.scene)
         return self._run(job, tools)
 
-    def _class(self) -> type[SceneJob | StudyJob[Any]]:
+    def _class(self) -> type[SceneJob | StudyJob]:
         module, _, name = JOBS[self.kind].partition(":")
-        found: type[SceneJob | StudyJob[Any]] = getattr(import_module(f"vanedamp.studies.jobs.{module}"), name)
+        found: type[SceneJob | StudyJob] = getattr(import_module(f"vanedamp.studies.jobs.{module}"), name)
         return found
 
-    def _job(self, rigid: dict[str, Any], amplitude: float | None) -> SceneJob | StudyJob[Any]:
+    def _job(self, rigid: dict[str, Any], amplitude: float | None) -> SceneJob | StudyJob:
         """Return the job on the structure and at the level that the pipeline gives."""
         options = dict(zip(self.OPTIONS[1:], (path.name for path in self.outputs[1:]), strict=False))
         return self._class().of_tables(self._tables(rigid, amplitude), self.file, **options)

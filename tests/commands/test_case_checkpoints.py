@@ -1,4 +1,4 @@
-"""`vanedamp campbell` and `calibrate` resume after a kill, and give the same files as without it, byte by byte."""
+"""`vanedamp campbell`, `ring` and `calibrate` resume after a kill; files are the same as without it, byte by byte."""
 
 import subprocess
 import sys
@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from tests.commands.test_info import ROTATING
+from tests.commands.test_ring import DISK, TURNING
 from tests.tools.input_files import DAMPED_BLOCK, changed
 from tests.tools.processes import environment
 from vanedamp.files.store import load
@@ -42,6 +43,7 @@ normal = 1e6
 CASES = {
     "campbell": DAMPED_BLOCK + ROTATING,
     "gyroscopic": DAMPED_BLOCK + changed(ROTATING, ("axis", "gyroscopic = true\naxis")),
+    "ring": DISK + TURNING,
     "calibrate": TUNED,
 }
 
@@ -56,18 +58,19 @@ def signalled(folder, command, number, writes, *words):
 
 @pytest.mark.parametrize(
     ("case", "number", "writes", "status"),
-    [("campbell", 9, 1, -9), ("gyroscopic", 15, 1, 143), ("calibrate", 2, 2, 130), ("calibrate", 15, 1, 143),
-     ("calibrate", 9, 3, -9)],
+    [("campbell", 9, 1, -9), ("gyroscopic", 15, 1, 143), ("ring", 9, 2, -9), ("calibrate", 2, 2, 130),
+     ("calibrate", 15, 1, 143), ("calibrate", 9, 3, -9)],
 )  # fmt: skip
 def test_a_stopped_command_resumes(tmp_path, monkeypatch, case, number, writes, status):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(CASES[case])
-    command = "calibrate" if case == "calibrate" else "campbell"
+    command = "campbell" if case == "gyroscopic" else case
     assert main([command, "case.toml", "-o", "whole.h5"]) == 0
     code, error = signalled(tmp_path, command, number, writes, "-o", "cut.h5")
     assert code == status, error
     assert not (tmp_path / "cut.h5").exists()
-    kept = len(load("cut.h5.partial", f"{command}-checkpoint")[0]["solution"])
+    kind = "campbell" if command == "ring" else command
+    kept = len(load("cut.h5.partial", f"{kind}-checkpoint")[0]["solution"])
     assert kept >= writes
     assert main([command, "case.toml", "-o", "cut.h5", "--resume"]) == 0
     assert (tmp_path / "cut.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()

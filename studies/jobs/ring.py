@@ -1,0 +1,178 @@
+"""`vanedamp ring`: modes of a ring by nodal diameter, and the engine orders that meet them."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from vanedamp.coupling.scene.mistuning import DEVIATIONS
+from vanedamp.files.toml_input import InputError
+from vanedamp.modal.records.campbell import RPM
+from vanedamp.modal.records.interference import Interference
+from vanedamp.rom.ring.study import MistuningStudy, mistuning_study
+from vanedamp.studies.case.ring_interference import ring_interference
+from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
+from vanedamp.studies.case.stages import assemble, unit_doubts
+from vanedamp.studies.case.structure import Structure
+from vanedamp.studies.case.tables import Case
+from vanedamp.studies.headline import format_margin
+from vanedamp.studies.jobs.job import Job, Means, Outcome, Write
+from vanedamp.studies.terminal import progress
+
+#: families, and engine orders of a diameter, that are printed at most; meetings
+_MOST_FAMILIES, _MOST_ORDERS, _MOST_MEETINGS = 8, 4, 40
+#: families of a reduced ring at least
+_FAMILIES = 3
+
+
+@dataclass(frozen=True)
+class RingJob(Job):
+    """Computes the modes of a case's ring, where engine orders meet them, and the amplification by its mistuning.
+
+    operating: lowest and highest speed, rad/s; orders: engine orders; draws: of [mistuning]; family: from 1, around
+    whose frequencies amplification counts.
+    """
+
+    case: Case
+    operating: tuple[float, float] | None = None
+    orders: Sequence[int] | None = None
+    draws: int = 100
+    family: int = 1
+    TITLE: ClassVar[str] = "ring"
+
+    @classmethod
+    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+        """Return the job of a case. Raises InputError for speeds in a wrong order, and draws of nothing."""
+        (case,) = given
+        operating = None if arguments.rpm is None else (arguments.rpm[0] / RPM, arguments.rpm[1] / RPM)
+        if operating is not None and not operating[0] <= operating[1]:
+            raise InputError("--rpm: expected the lowest speed, then the highest")
+        if arguments.mistuning and case.mistuning is None:
+            raise InputError("--mistuning: the case has no table [mistuning], such as frequency = {std = 0.01}")
+        return cls(arguments.input, case, operating, arguments.orders, arguments.draws, arguments.family)
+
+    @property
+    def files(self) -> Iterable[str | Path]:
+        """The case's files."""
+        return self.case.files
+
+    def work(self, means: Means) -> Outcome:
+        """Compute them. The checkpoint has the solutions over the speeds of [campbell]."""
+        structure = assemble(self.case)
+        modes = ring_analysis(structure)
+        found = ring_interference(structure, modes, self.operating, self.orders, means.report, means.checkpoint)
+        warnings, files, data = list(unit_doubts(structure)), _files(structure, found), dict[str, Any]()
+        study = None
+        if self.case.mistuning is not None:
+            study, doubts = self._study(structure, found)
+            warnings += doubts
+            files["mistuning"] = study.save
+            data["mistuning"] = study.to_json()
+        sentence = f"{len(modes)} modes of {modes.sectors} sectors, {len(found.meetings)} meetings with engine orders"
+        return Outcome(
+            found, lambda _: _summary(found, study), sentence, (), warnings, files, data | {"warnings": warnings}
+        )  # fmt: skip
+
+    def _study(self, structure: Structure, found: Interference) -> tuple[MistuningStudy, list[str]]:
+        """Return the amplification over draws, of the orders named, or one for each diameter from 1; and doubts.
+
+        Raises InputError for a case without an interface, and RingError.
+        """
+        table, half = self.case.mistuning, found.modes.sectors // 2
+        assert table is not None
+        named = self.orders or (self.case.campbell is not None and self.case.campbell.engine_orders)
+        ring = ring_reduction(structure, max(self.family, _FAMILIES))
+        drawn = any(each is not None and each.std is not None for each in (getattr(table, name) for name in DEVIATIONS))
+        with progress("draws") as report:
+            study = mistuning_study(
+                ring, table, found.orders if named else range(1, half + 1), self.draws if drawn else 1,
+                family=self.family - 1, speed=found.speed or 0.0, report=report,
+            )  # fmt: skip
+        rotation = self.case.rotation
+        if rotation is None or not rotation.gyroscopic:
+            return study, []
+        tuned, modes = ring.tuned_families(found.speed or 0.0), found.modes
+        own = modes.families == self.family - 1
+        without = [tuned.frequency_hz(abs(int(diameter)), self.family - 1) for diameter in modes.diameters[own]]
+        shift = float(np.nanmax(np.abs(modes.frequencies_hz[own] / without - 1.0), initial=0.0))
+        return study, [
+            "rotation.gyroscopic: [mistuning] leaves the gyroscopic coupling out, which shifts frequencies of family "
+            f"{self.family} by up to {shift:.2%}"
+        ]
+
+
+def _files(structure: Structure, found: Interference) -> dict[str, Write]:
+    """Return by its option what writes a file of the modes."""
+
+    def save(path: str) -> None:
+        mesh, cell_type = structure.mesh()
+        ratio = structure.matrices.damping_ratio
+        found.save(path, mesh, {"vtk_cell_type": cell_type, "damping_ratio": ratio})
+
+    def picture(path: str) -> None:
+        from vanedamp.studies.kinds.ring_modes.picture import interference_picture  # matplotlib, for this file only
+
+        interference_picture(found, Path(path))
+
+    return {"output": save, "picture": picture}
+
+
+def _summary(found: Interference, study: MistuningStudy | None) -> Iterator[str]:
+    """Yield modes, meetings and, with mistuning, the amplification."""
+    yield from _modes(found)
+    if study is not None:
+        yield from _amplification(study)
+
+
+def _modes(found: Interference) -> Iterator[str]:
+    """Yield frequencies by nodal diameter, the engine orders of each, and the meetings."""
+    rows, modes = found.by_diameter(), found.modes
+    families = min(len(rows[0][1]), _MOST_FAMILIES)
+    wide = max(8, *(len(found.label(diameter)) for diameter, _ in rows))
+    at = "" if found.speed is None else f" at {found.speed * RPM:.6g} rpm"
+    yield f"natural frequencies in Hz of {modes.sectors} sectors by nodal diameter{at}"
+    yield f"{'diameter':>{wide}}  engine orders     " + "".join(
+        f"  family {family + 1:2}" for family in range(families)
+    )
+    for diameter, row in rows:
+        orders = found.exciting(diameter)
+        listed = ", ".join(map(str, orders[:_MOST_ORDERS])) + (" ..." if len(orders) > _MOST_ORDERS else "")
+        yield f"{found.label(diameter):>{wide}}  {listed:18}" + "".join(f"{value:11.2f}" for value in row[:families])
+    if found.operating is None and not found.speeds.size:
+        yield "no speed is known at which engine orders could meet them: [rotation], [campbell] or --rpm gives it"
+        return
+    margin = "" if found.operating is None else "  margin to operation"
+    yield "meetings with engine orders"
+    yield f"{'diameter':>{wide + 2}}  family  order         rpm       rad/s          Hz{margin}"
+    for each in found.meetings[:_MOST_MEETINGS]:
+        told = "" if found.operating is None else f"  {format_margin(each.margin(found.operating)):>19}"
+        diameter, family = int(modes.diameters[each.mode]), modes.families[each.mode] + 1
+        yield (
+            f"{found.label(diameter):>{wide + 2}}{family:8}{each.order:7g}{each.rpm:12.3f}{each.speed:12.4f}"
+            f"{each.frequency_hz:12.4f}{told}"
+        )
+    more = len(found.meetings) - _MOST_MEETINGS
+    if more > 0:
+        yield f"  and {more} more, in the result's file and its report"
+    if not found.meetings:
+        yield "  none"
+
+
+def _amplification(study: MistuningStudy) -> Iterator[str]:
+    """Yield the amplification by engine order."""
+    told, (low, high) = study.to_json(), study.band_hz
+    draws = f"{len(study.seeds)} draw{'s' if len(study.seeds) > 1 else ''}"
+    yield f"amplification at {study.label}, {draws} of [mistuning], peaks from {low:.6g} to {high:.6g} Hz"
+    yield "  order   tuned/Hz     median       95 %    largest  sector       seed"
+    for row in told["orders"]:
+        median, high_quantile, _ = (each["value"] for each in row["quantiles"])
+        yield (
+            f"{row['order']:7}{row['tuned_frequency_hz']:11.2f}{median:11.4f}{high_quantile:11.4f}"
+            f"{row['amplification']['largest']:11.4f}{row['worst']['sector']:8}{row['worst']['seed']:11}"
+        )
+    yield f"one family of modes stays below {study.bound:.4f} (Whitehead)"
