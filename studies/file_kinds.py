@@ -19,7 +19,7 @@ KINDS = {
         FileKind(
             "pipeline",
             "vanedamp.studies.pipeline.tables:PipelineFile",
-            ("calibrate", "modal", "reduce", "identify", "report", "folder"),
+            ("calibrate", "modal", "reduce", "identify", "run", "orbits", "ringdown", "report", "folder"),
         ),
         FileKind("external", "vanedamp.studies.case.external_model:External", ("matrices",), command="import"),
         FileKind(
@@ -49,6 +49,8 @@ KINDS = {
 }
 #: kinds that have the tables of a scene as well
 _WITH_SCENE = ("identification", "life", "study")
+#: stages of pipelines, lists there, whose names are tables in scenes and studies
+_STAGES = ("sweep", "ramp", "optimise", "life")
 #: what commands take besides: HDF5, and TOML of every kind
 RESULT, ANY = "result", "input"
 _MESH = "a mesh, which a case names in [mesh] file"
@@ -60,7 +62,7 @@ _OTHERS = {".json": "JSON, for other programs", ".csv": "a table", ".html": "a p
 
 def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:
     """Return the kind of a file, which its tables tell. Raises InputError for a file of no kind."""
-    if isinstance(tables.get("sweep"), list):  # a scene has one table of that name
+    if any(isinstance(tables.get(name), list) for name in _STAGES):
         return KINDS["pipeline"]
     for kind in KINDS.values():
         if not set(kind.tables).isdisjoint(tables):

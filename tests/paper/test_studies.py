@@ -295,7 +295,7 @@ def test_points_that_failed_are_named():
 
 def test_resumed_session_takes_over_what_is_of_the_same_scene(folder, monkeypatch):
     effort = Effort(points=9, periods=430, transient=390)
-    monkeypatch.setattr(figure_study, "sweep", None)
+    monkeypatch.setattr(jobs_sweep, "sweep", None)
     study("fig9", PaperSession(STRUCTURE, folder, effort=effort, resume=True))
     with pytest.raises(TypeError):  # another scene, and so another sweep
         study("fig9", PaperSession(replace(STRUCTURE, amplitude=60e-6), folder, effort=effort, resume=True))
