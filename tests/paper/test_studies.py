@@ -28,6 +28,7 @@ from vanedamp.studies.demo.claims import verdict
 from vanedamp.studies.demo.curve import curves
 from vanedamp.studies.demo.figure_file import Effort, Structure, linear_peaks
 from vanedamp.studies.demo.figure_study import Read
+from vanedamp.studies.jobs import sweep as jobs_sweep
 from vanedamp.studies.report.results import collect
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
