@@ -13,7 +13,7 @@ from vanedamp.studies.case.calibration import Calibration, calibrate
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.headline import cavity_lines
 from vanedamp.studies.hot_spots import plus_minus
-from vanedamp.studies.jobs.job import Job, Means, Outcome, Write
+from vanedamp.studies.jobs.job import Job, JobResult, Means, Write
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class CalibrateJob(Job):
         """The case's files."""
         return self.case.files
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Calibrate."""
         found = calibrate(self.case, means.checkpoint)
         result = found.to_json()
@@ -36,7 +36,7 @@ class CalibrateJob(Job):
             "case": partial(save_tuned_case, self.source, found),
             "scene": partial(save_rigid_scene, self.source, found),
         }
-        return Outcome(found, lambda _: _summary(result), _sentence(found), (), found.warnings, files)
+        return JobResult(found, lambda _: _summary(result), _sentence(found), (), found.warnings, files)
 
 
 def _sentence(found: Calibration) -> str:

@@ -12,7 +12,7 @@ from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.headline import format_margin
-from vanedamp.studies.jobs.job import Job, Means, Outcome
+from vanedamp.studies.jobs.job import Job, JobResult, Means
 
 #: columns (modes) and rows (speeds) that are printed at most
 _MOST_COLUMNS, _MOST_ROWS = 12, 25
@@ -30,7 +30,7 @@ class CampbellJob(Job):
         """The case's files."""
         return self.case.files
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Compute it."""
         structure = assemble(self.case)
         diagram = campbell_diagram(structure, means.report, means.checkpoint)
@@ -43,7 +43,7 @@ class CampbellJob(Job):
 
         sentence = f"{len(diagram.modes)} modes, {len(diagram.crossings)} crossings with engine orders"
         data = {"warnings": warnings}
-        return Outcome(diagram, partial(_summary, diagram), sentence, (), warnings, {"picture": picture}, data)
+        return JobResult(diagram, partial(_summary, diagram), sentence, (), warnings, {"picture": picture}, data)
 
 
 def _summary(diagram: Campbell, seconds: float) -> Iterator[str]:

@@ -15,7 +15,7 @@ from vanedamp.coupling.ensembles.record import Ensemble, spreads
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.provenance import versions
 from vanedamp.studies.jobs.budget import check_sweep
-from vanedamp.studies.jobs.job import Means, Outcome, SceneJob, choice_notes
+from vanedamp.studies.jobs.job import JobResult, Means, SceneJob, choice_notes
 from vanedamp.studies.jobs.points import ends_of, finished
 
 #: curves whose sentences are printed
@@ -54,14 +54,14 @@ class EnsembleJob(SceneJob):
         """Return the scenes of the first and the last point."""
         return ends_of(self.points)
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Run all that is not done."""
         resumed = self.finished(means.checkpoint)
         result = ensemble(self.points, means.pool, means.report, means.checkpoint, means.provenance)
         new = [text for text in result.provenance.get("warnings", ()) if text not in self.points.grid.warnings]
         size = f"{self.points.size} points of {len(result.status)} samples"
         lines = partial(_summary, result, f"{size}, {resumed} of them from the checkpoint")
-        return Outcome(result, lines, size, warnings=new, data={"points_resumed": resumed})
+        return JobResult(result, lines, size, warnings=new, data={"points_resumed": resumed})
 
 
 def _summary(result: Ensemble, size: str, seconds: float) -> Iterator[str]:

@@ -17,7 +17,7 @@ from vanedamp.studies.identification.record import Identification, Identificatio
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.identification.summary import noise_texts, number_texts, proposal_text
-from vanedamp.studies.jobs.job import Job, Means, Outcome
+from vanedamp.studies.jobs.job import Job, JobResult, Means
 
 
 @dataclass(frozen=True)
@@ -47,10 +47,10 @@ class IdentifyJob(Job):
         """Return the scene at the numbers' first values."""
         return (self.study.base,)
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Find them."""
         found = identify(self.study, means.pool, means.report, means.provenance, means.checkpoint, budget=self.budget)
-        return Outcome(
+        return JobResult(
             found, lambda _: _summary(found), f"{found.status.value}, {found.sentence.removesuffix('.')}",
             warnings=found.notes, files={"scene": found.save_scene},
             unfinished=found.status is IdentificationStatus.BUDGET,
@@ -78,7 +78,7 @@ class DeviationsJob(Job):
         """The ring's file, and the measurements."""
         return self.table.ring, self.table.file
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Find them."""
         provenance = {"table": asdict(self.table)} | means.provenance
         found = replace(identify_deviations(self.table), provenance=provenance)
@@ -87,7 +87,7 @@ class DeviationsJob(Job):
         for sector, (value, error) in enumerate(zip(found.stiffness, found.errors, strict=True)):
             lines.append(f"{sector:6}{value:21.6f}{error:20.2g}")
         rows = partial(write_csv, header=("sector", "deviation"), rows=enumerate(found.stiffness.tolist()))
-        return Outcome(found, lambda _: lines, sentence, files={"csv": rows})
+        return JobResult(found, lambda _: lines, sentence, files={"csv": rows})
 
 
 def _summary(found: Identification) -> Iterator[str]:

@@ -29,7 +29,7 @@ from vanedamp.studies.terminal import progress, stage
 Write = Callable[[str], object]
 
 
-class Record(Protocol):
+class Saved(Protocol):
     """A result with a file and JSON."""
 
     def save(self, path: str) -> object:
@@ -53,7 +53,7 @@ class Means(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class JobResult:
     """What came of a job.
 
     record     the result
@@ -67,7 +67,7 @@ class Outcome:
     unfinished whether the checkpoint stays, for the same command to go on from
     """
 
-    record: Record
+    record: Saved
     lines: Callable[[float], Iterable[str]]
     sentence: str
     notes: Sequence[str] = ()
@@ -152,12 +152,12 @@ class Job(ABC):
         return () if self.scene is None else (self.scene,)
 
     @abstractmethod
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Do it. Raises VanedampError."""
 
     def run(
         self, pool: Callable[[], Executor | None] = lambda: None, checkpoint: Path | None = None, title: str = ""
-    ) -> tuple[Outcome, float]:
+    ) -> tuple[JobResult, float]:
         """Compile the engine, and do the work with its progress shown. Returns what came of it, and its time, s.
 
         pool: returns worker processes, which are slow to start, once the checkpoint is known to belong to the job.

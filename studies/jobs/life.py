@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.jobs.budget import check_life
-from vanedamp.studies.jobs.job import Means, Outcome, StudyJob
+from vanedamp.studies.jobs.job import JobResult, Means, StudyJob
 from vanedamp.studies.life.life import life
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.life.study import LifeFile, LifeStudy
@@ -27,10 +27,10 @@ class LifeJob(StudyJob):
         """Reject a life that takes a month."""
         check_life(self.study, workers)
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Integrate it."""
         record = life(self.study, means.pool, means.report, means.provenance, means.checkpoint)
-        return Outcome(record, partial(_summary, record), record.sentence)
+        return JobResult(record, partial(_summary, record), record.sentence)
 
 
 def _summary(record: LifeRecord, seconds: float) -> Iterator[str]:

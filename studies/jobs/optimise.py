@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.jobs.budget import check_optimise
-from vanedamp.studies.jobs.job import Means, Outcome, StudyJob
+from vanedamp.studies.jobs.job import JobResult, Means, StudyJob
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import optimise
 from vanedamp.studies.optimisation.study import Study, StudyFile
@@ -32,10 +32,10 @@ class OptimiseJob(StudyJob):
         low, high = self.study.table.variables.bodies
         return map(self.study.with_bodies, range(low, high + 1))
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Search."""
         found = optimise(self.study, means.pool, means.report, means.provenance, means.checkpoint)
-        return Outcome(found, partial(_summary, found), found.sentence, warnings=self.study.doubts)
+        return JobResult(found, partial(_summary, found), found.sentence, warnings=self.study.doubts)
 
 
 def _summary(optimisation: Optimisation, seconds: float) -> Iterator[str]:

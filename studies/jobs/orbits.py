@@ -10,7 +10,7 @@ from typing import ClassVar
 from vanedamp.coupling.orbits.branch import Branches
 from vanedamp.coupling.orbits.orbits import orbits
 from vanedamp.studies.jobs.budget import check_run
-from vanedamp.studies.jobs.job import Means, Outcome, SceneJob
+from vanedamp.studies.jobs.job import JobResult, Means, SceneJob
 
 
 @dataclass(frozen=True)
@@ -23,12 +23,12 @@ class OrbitsJob(SceneJob):
         """Reject a run before the branch that takes a month."""
         check_run(self.of)
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Follow the branches."""
         result = orbits(self.of, means.report, means.checkpoint, means.provenance)
         count = sum(len(branch.parameter) for branch in result.branches)
         sentence = f"{count} orbits on {len(result.branches)} branches"
-        return Outcome(result, partial(_summary, result), sentence, warnings=result.warnings)
+        return JobResult(result, partial(_summary, result), sentence, warnings=result.warnings)
 
 
 def _summary(result: Branches, seconds: float) -> Iterator[str]:

@@ -12,7 +12,7 @@ from vanedamp.coupling.transients.ramp import ramp
 from vanedamp.coupling.transients.ramp_course import ramped
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.studies.hot_spots import plus_minus, strength_lines
-from vanedamp.studies.jobs.job import Means, Outcome, SceneJob
+from vanedamp.studies.jobs.job import JobResult, Means, SceneJob
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class RampJob(SceneJob):
         """Return the scene with a phase of its own, as ramps run it."""
         return (ramped(self.of),)
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Run it."""
         result = ramp(self.of, means.report, means.provenance, means.checkpoint)
-        return Outcome(result, partial(_summary, result), _sentence(result), warnings=result.warnings)
+        return JobResult(result, partial(_summary, result), _sentence(result), warnings=result.warnings)
 
 
 def _sentence(result: Ramp) -> str:

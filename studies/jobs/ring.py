@@ -21,7 +21,7 @@ from vanedamp.studies.case.stages import assemble, unit_doubts
 from vanedamp.studies.case.structure import Structure
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.headline import format_margin
-from vanedamp.studies.jobs.job import Job, Means, Outcome, Write
+from vanedamp.studies.jobs.job import Job, JobResult, Means, Write
 from vanedamp.studies.terminal import progress
 
 #: families, and engine orders of a diameter, that are printed at most; meetings
@@ -61,7 +61,7 @@ class RingJob(Job):
         """The case's files."""
         return self.case.files
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Compute them. The checkpoint has the solutions over the speeds of [campbell]."""
         structure = assemble(self.case)
         modes = ring_analysis(structure)
@@ -74,7 +74,7 @@ class RingJob(Job):
             files["mistuning"] = study.save
             data["mistuning"] = study.to_json()
         sentence = f"{len(modes)} modes of {modes.sectors} sectors, {len(found.meetings)} meetings with engine orders"
-        return Outcome(
+        return JobResult(
             found, lambda _: _summary(found, study), sentence, (), warnings, files, data | {"warnings": warnings}
         )  # fmt: skip
 

@@ -14,7 +14,7 @@ from vanedamp.coupling.transients.ring_down_start import free_scene, table_of
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.hot_spots import plus_minus, strength_lines
 from vanedamp.studies.jobs.budget import check_run
-from vanedamp.studies.jobs.job import Means, Outcome, SceneJob, choice_notes
+from vanedamp.studies.jobs.job import JobResult, Means, SceneJob, choice_notes
 from vanedamp.studies.scene_checks import check_numbers
 
 #: rows of the table that is printed
@@ -40,12 +40,12 @@ class RingDownJob(SceneJob):
         if table.start == "steady":
             check_run(self.of)
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Let it ring down."""
         result = ring_down(self.of, means.report, means.provenance)
         linear, notes = result.linear, tuple(choice_notes(result.estimate, result.advice))
         sentence = f"mode {linear.mode}, {linear.frequency:.6g} Hz: {len(result.half_cycles.time)} half cycles"
-        return Outcome(result, lambda _: _summary(result), sentence, notes, result.warnings)
+        return JobResult(result, lambda _: _summary(result), sentence, notes, result.warnings)
 
 
 def _summary(result: RingDown) -> Iterator[str]:

@@ -15,7 +15,7 @@ from vanedamp.files.reference import field_docstrings
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.jobs.budget import check_run
-from vanedamp.studies.jobs.job import Job, Means, Outcome, SceneJob, choice_notes
+from vanedamp.studies.jobs.job import Job, JobResult, Means, SceneJob, choice_notes
 from vanedamp.studies.terminal import progress
 
 
@@ -54,7 +54,7 @@ class RunJob(SceneJob):
         """Reject a run that takes a month, or more memory than there is."""
         check_run(self.of, self.samples)
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Run it."""
         response = simulate(
             self.of, self.events, self.samples, progress=means.report, moved_start=self.moved_start
@@ -66,7 +66,7 @@ class RunJob(SceneJob):
         def save(path: str) -> None:
             response.save(path, means.provenance | {"scene": self.of.to_dict()})
 
-        return Outcome(
+        return JobResult(
             response, lambda _: _summary(response, result), f"amplitude {response.amplitude_mean:.5g} m",
             tuple(choice_notes(response.estimate, response.advice)), response.warnings, {"output": save}, result,
         )  # fmt: skip

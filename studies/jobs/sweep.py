@@ -20,7 +20,7 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.jobs.budget import check_run, check_sweep
-from vanedamp.studies.jobs.job import Job, Means, Outcome, SceneJob, Write, choice_notes
+from vanedamp.studies.jobs.job import Job, JobResult, Means, SceneJob, Write, choice_notes
 from vanedamp.studies.jobs.points import ends_of, finished
 from vanedamp.studies.report.designs import Design, designs
 from vanedamp.studies.report.forced_response import forced_responses
@@ -103,7 +103,7 @@ class SweepJob(SceneJob):
         """Return the scenes of the first and the last point."""
         return ends_of(self.points)
 
-    def work(self, means: Means) -> Outcome:
+    def work(self, means: Means) -> JobResult:
         """Run every point that is not done, and once more the one with the highest mean."""
         resumed, points = self.finished(means.checkpoint), self.points
         provenance = means.provenance | dict(self.provenance)
@@ -120,7 +120,7 @@ class SweepJob(SceneJob):
         bad = int((result.status != "ok").sum())
         best = [design.sentence for design in judged if design.worst.reference > 0]
         sentence = f"{bad} of {result.status.size} points are not ok; " if bad else ""
-        return Outcome(
+        return JobResult(
             result, partial(_summary, result, judged, f"{points.size} points, {resumed} of them from the checkpoint"),
             sentence + (best[0] if best else f"{result.status.size} points"), notes, new, files,
             {"points_resumed": resumed, "headlines": [each.to_json() for each in responses],

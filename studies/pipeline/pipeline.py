@@ -16,7 +16,7 @@ from vanedamp.files.errors import VanedampError
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.jobs.workers import available_cores
 from vanedamp.studies.jobs.workers import workers as worker_processes
-from vanedamp.studies.pipeline.record import Record
+from vanedamp.studies.pipeline.record import PipelineRecord
 from vanedamp.studies.pipeline.stages import Stage, Tools, stages
 from vanedamp.studies.pipeline.tables import PipelineFile
 
@@ -81,7 +81,7 @@ def pipeline(
     listed = list(stages(table, source, target))
     say = note or (lambda line: None)
     _check(listed, [source, *table.named_files.values()], source, workers or available_cores())
-    record = Record(target / f"{source.stem}.record.json")
+    record = PipelineRecord(target / f"{source.stem}.record.json")
     _keep_edited(listed, record)
     if dry_run:
         return PipelineResult(tuple(_plan(listed, record, say)), time.perf_counter() - started)
@@ -101,13 +101,15 @@ def adopt(path: str | Path) -> None:
     """Note that results in the folder of a pipeline file match its inputs as they are: made by other means."""
     table, source = PipelineFile.load(path), Path(path)
     folder = source.parent / table.folder
-    record = Record(folder / f"{source.stem}.record.json")
+    record = PipelineRecord(folder / f"{source.stem}.record.json")
     for stage in stages(table, source, folder):
         if all(output.exists() for output in stage.outputs):
             record.end(stage.name, stage.inputs(), stage.outputs)
 
 
-def _done(stage: Stage, record: Record, say: Callable[[str], None], pool: Callable[[], Executor | None]) -> StageResult:
+def _done(
+    stage: Stage, record: PipelineRecord, say: Callable[[str], None], pool: Callable[[], Executor | None]
+) -> StageResult:
     """Run a stage unless its results match its inputs."""
     outputs, inputs = tuple(map(_shown, stage.outputs)), stage.inputs()
     reasons = tuple(record.reasons(stage.name, inputs, stage.outputs))
@@ -125,7 +127,7 @@ def _done(stage: Stage, record: Record, say: Callable[[str], None], pool: Callab
     return StageResult(stage.name, "done", reasons, outputs, found, seconds)
 
 
-def _plan(listed: Sequence[Stage], record: Record, say: Callable[[str], None]) -> list[StageResult]:
+def _plan(listed: Sequence[Stage], record: PipelineRecord, say: Callable[[str], None]) -> list[StageResult]:
     """Return which stages would run and why."""
     running: dict[Path, str] = {}
     plan = []
@@ -163,7 +165,7 @@ def _check(listed: Sequence[Stage], files: Iterable[str | Path], source: Path, w
             raise InputError(f"{source}: {name} writes {path.name}, which is an input; give another folder or name")
 
 
-def _keep_edited(listed: Sequence[Stage], record: Record) -> None:
+def _keep_edited(listed: Sequence[Stage], record: PipelineRecord) -> None:
     """Reject overwriting a case or a scene that somebody has edited; other results are made again."""
     for stage in listed:
         for path in record.edited(stage.name, [path for path in stage.outputs if path.suffix == ".toml"]):

@@ -19,7 +19,7 @@ _MOST, _ENTRIES = 3, 4
 Inputs = Mapping[str, Any]
 
 
-class Record:
+class PipelineRecord:
     """The record of a pipeline.
 
     done: by the name of a stage its `inputs` and the digests of its `outputs` (None: not written); begun: the inputs of
