@@ -10,20 +10,17 @@ import time
 from abc import ABC, abstractmethod
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor
-from contextlib import suppress
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
-from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.sweep import warm_up
 from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import clear_leftovers
 from vanedamp.studies.scene_checks import check_moved, check_numbers
-from vanedamp.studies.terminal import progress, stage
+from vanedamp.studies.terminal import progress
 
 #: takes the path of a file and writes it
 Write = Callable[[str], object]
@@ -165,7 +162,10 @@ class Job(ABC):
         self.finished(checkpoint)
         processes = pool() if self.PARALLEL else None
         started = time.perf_counter()
-        compile_engine(self.compiled(), processes)
+        if scenes := list(self.compiled()):
+            from vanedamp.studies.jobs.engine import compile_engine  # loads it, which finite elements do not use
+
+            compile_engine(scenes, processes)
         with progress(title or self.TITLE) as report:
             outcome = self.work(Means(processes, report, checkpoint, {"versions": versions()}))
         return outcome, time.perf_counter() - started
@@ -232,22 +232,6 @@ class StudyJob(Job):
     def of_tables(cls, tables: Mapping[str, Any], path: Path, **options: Any) -> Self:
         """Return the job on the study in the tables of a file. Raises InputError."""
         return cls(str(path), cls.STUDY.of(tables, path), **options)
-
-
-def compile_engine(scenes: Iterable[Scene], pool: Executor | None = None) -> None:
-    """Compile the engine that scenes need, which a progress that begins afterwards does not count.
-
-    Left out are scenes with open choices, which decide what is compiled.
-    """
-    title = "load the engine; the first time it is compiled, which takes a minute or two"
-    with stage(title), suppress(BrokenExecutor):  # a scene that ends its worker does so again
-        for scene in scenes:
-            if leaves_open(scene):
-                continue
-            if pool is None:
-                warm_up(scene)
-            else:
-                pool.submit(warm_up, scene).result()
 
 
 def choice_notes(estimate: Mapping[str, Any] | None, advice: Mapping[str, Any] | None) -> Iterator[str]:

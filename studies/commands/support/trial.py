@@ -26,7 +26,7 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_responses
 from vanedamp.files.store import frozen
 from vanedamp.studies.jobs.budget import RUN
-from vanedamp.studies.jobs.job import compile_engine
+from vanedamp.studies.jobs.engine import compile_engine
 from vanedamp.studies.terminal import stage
 
 #: scenes of a set that are tried, and the time for all of them, s

@@ -15,7 +15,7 @@ from tests.tools.processes import ROOT
 from vanedamp.coupling.response.response import Status
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.cli import BAD_INPUT, main
-from vanedamp.studies.jobs import job
+from vanedamp.studies.jobs import engine
 from vanedamp.studies.kinds.plot import plot
 from vanedamp.studies.life import fast
 from vanedamp.studies.life.life import life
@@ -226,7 +226,7 @@ def test_resumes_after_an_interrupt_at_any_run(monkeypatch, tmp_path):
 
 def test_command_record_report_and_chart(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(fast, "simulate", Damper())
-    monkeypatch.setattr(job, "compile_engine", lambda *_: None)
+    monkeypatch.setattr(engine, "compile_engine", lambda *_: None)
     path, out = tmp_path / "life.toml", tmp_path / "life.h5"
     path.write_text(tomli_w.dumps(SCENE))
     assert main(["life", str(path), "-o", str(out), "--workers", "1", "--json", str(tmp_path / "life.json")]) == 0
