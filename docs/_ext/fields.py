@@ -16,7 +16,7 @@ from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
 from docs._ext.toml_keys import table_node, with_literals
-from vanedamp.files.record import Array, Named, Record, Rows, Sparse, Unit, Within, declared
+from vanedamp.files.record import Array, Columns, Named, Paths, Ragged, Record, Rows, Sparse, Unit, Within, declared
 from vanedamp.files.reference import unit_in
 from vanedamp.studies import kinds
 
@@ -67,7 +67,7 @@ class Described(NamedTuple):
 def described(record: type, names: Sequence[str] = ()) -> list[Described]:
     """Return the fields of a record: the unit of its annotation, else that at the end of the docstring after it.
 
-    With those of a record within it, and of its rows.
+    With those of a record within it, of its rows, and of its parts, whose dimension is their first.
     """
     texts, found = _texts(record), []
     layouts = declared(record) if is_dataclass(record) else {}
@@ -81,6 +81,13 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
                 row._replace(name=f"{layout.dim}_{row.name}", dims=", ".join(filter(None, (layout.dim, row.dims))))
                 for row in described(get_args(kind)[0])
             ]
+        elif isinstance(layout, Ragged):
+            found += _of_parts(get_args(kind)[0], layout)
+        elif isinstance(layout, Columns):
+            found.append(Described(f"{layout.prefix}QUANTITY", ", ".join((*layout.dims, "...")), "", text))
+        elif isinstance(layout, Paths):
+            name = f"{layout.dim}_AXIS" if layout.dim else "AXIS"
+            found.append(Described(name, layout.dim or "AXIS", "", text))
         elif isinstance(layout, Sparse):
             found += [
                 Described(one, f"{one}_entry", layout.unit, f"entries of the matrix {text}"),
@@ -88,13 +95,30 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
                 Described(f"{one}_row_start", "row_edge", "", "places among them where rows begin, and the last ends"),
             ]
         elif isinstance(layout, Array) and not layout.attribute:
-            parts = ("_real", "_imaginary") if layout.dtype is complex else ("",)
+            parts = ("_real", layout.imaginary) if layout.dtype is complex else ("",)
             own = ", ".join((layout.name or one) + part for part in parts)
             found.append(Described(own, ", ".join(layout.dims), _unit(layout), text))
         else:
             unit = _unit(layout) if isinstance(layout, Array | Unit) else unit_in(text) or ""
             name = layout.name if isinstance(layout, Named) else one
             found.append(Described(name, "", unit, text.removesuffix(f"[{unit}]").rstrip()))
+    return found
+
+
+def _of_parts(part: type, ragged: Ragged) -> list[Described]:
+    """Return the variables of parts: of their rows one after the other, and one each where they have a number."""
+    thing, dim, prefix = ragged
+    whose = f"index of the {thing} to which it belongs, from 0"
+    found = [Described(f"{thing}_of_{dim}", prefix + dim, "", whose)]
+    for name, (_, layout) in declared(part).items():
+        rows = layout.dim if isinstance(layout, Rows) else dim
+        if isinstance(layout, Rows):
+            found.append(Described(f"{prefix}{rows}_{thing}", prefix + rows, "", whose))
+        for one in described(part, [name]):
+            own = one.dims.split(", ") if one.dims else []
+            dims = [prefix + rows, *own[1:]] if own[:1] in ([rows], ["..."]) else [thing, *own]
+            names = ", ".join(prefix + each for each in one.name.split(", "))
+            found.append(one._replace(name=names, dims=", ".join(dims)))
     return found
 
 

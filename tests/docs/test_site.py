@@ -34,6 +34,8 @@ from vanedamp.studies.commands import COMMANDS
 from vanedamp.studies.file_kinds import KINDS
 
 DOCS = ROOT / "docs"
+#: a small file of every kind of result
+WRITTEN = ROOT / "tests" / "files" / "written"
 CHROMIUM = Path("/usr/bin/chromium")
 
 
@@ -86,6 +88,12 @@ def test_keys_have_meanings_units_and_defaults(kind):
     )  # fmt: skip
     assert (gap.value, gap.unit, gap.default) == ("number > 0", "m", "required")
     assert (mass.value, mass.unit) == ("number > 0", "kg")
+
+
+def test_page_of_files_has_every_kind_and_its_command():
+    rows = re.findall(r"^\| (\w+) \|.*\|(.*)\|$", (DOCS / "files.md").read_text(encoding="utf-8"), re.MULTILINE)
+    commands_of = dict(rows)
+    assert all(f"`{kind.command or kind.name}`" in commands_of[kind.name] for kind in KINDS.values())
 
 
 def test_anchors_of_keys_differ():
@@ -153,7 +161,7 @@ def test_fields_of_results_are_described():
     "name", ["modes", "life", "calibration", "optimisation", "mistuning", "campbell", "ring-modes", "system-matrices"]
 )
 def test_fields_have_the_dimensions_and_units_of_the_file(name):
-    kind, variables, _ = load_any(ROOT / "tests" / "files" / "written" / f"{name}.h5")
+    kind, variables, _ = load_any(WRITTEN / f"{name}.h5")
     found = [one for one in described(pkgutil.resolve_name(kinds.kind(kind).RECORD)) if one.dims]
     written = [(one, field) for field in found for one in field.name.split(", ") if one in variables]
     assert len(written) > 2
@@ -161,6 +169,23 @@ def test_fields_have_the_dimensions_and_units_of_the_file(name):
         assert (field.dims, field.unit or "1") == (", ".join(variables[one].dims), variables[one].units) or (
             name == "calibration" and one.startswith(("response", "fitted"))  # of the quantity
         ), one
+
+
+@pytest.mark.parametrize("path", sorted(WRITTEN.glob("*.h5")), ids=lambda path: path.stem)
+def test_page_of_results_has_all_that_files_contain(path):
+    """Variables but those that label a dimension, attributes, and keys of the JSON."""
+    kind, variables, attributes = load_any(path)
+    text, known = (DOCS / "reference" / "results.md").read_text(encoding="utf-8"), set(quantity.table())
+    if (found := kinds.kind(kind)) is not None:
+        fields = described(pkgutil.resolve_name(found.RECORD))
+        known |= {name for one in fields for name in one.name.split(", ")}
+    known |= set(re.findall(r"`([\w.]+)`", text))
+    patterns = [re.sub("QUANTITY|AXIS", r"\\w+", name) for name in known if re.search("_(QUANTITY|AXIS)$", name)]
+    patterns += [f"{name}\\w+" for name in re.findall(r"`(\w+_)\.\.\.`", text)]
+    in_json = path.with_suffix(".json")
+    given = {name for name, one in variables.items() if one.dims != (name,)} | attributes.keys()
+    given |= json.loads(in_json.read_text()).keys() if in_json.exists() else set()
+    assert {name for name in given - known if not re.fullmatch("|".join(patterns), name)} == set()
 
 
 def test_tables_of_statuses_have_all_of_them():
