@@ -17,7 +17,7 @@ NOT_IN_DERIVATIVES: dict[str, str] = {
     "neglected": "bounds an error of the model, and is none of the motion",
     **dict.fromkeys(("undamped", "fixed"), "is of the linear structure: take differences of its curve, without runs"),
     **dict.fromkeys(("undamped_top", "fixed_top"), "is of a curve over the frequency, not of one motion"),
-    "stress": "is taken from samples, which miss its extremes: differences of runs are as exact",
+    "stress": "is not differentiated: take differences of runs, whose stress is exact",
     "lyapunov": "is the growth of these derivatives in a motion that does not repeat",
     **dict.fromkeys(("section", "slip", "slip_velocity"), "is a series of states: `state_derivative` has the last"),
     "transient": "is a number of periods",
