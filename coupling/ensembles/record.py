@@ -75,11 +75,11 @@ class Ensemble(OverAxes):
     """of every point, as in a Sweep"""
     quantile: Annotated[Mapping[str, np.ndarray], Columns(spreads, ("quantile",), "quantile_")]
     """(5, ...) quantiles QUANTILES over the samples of points that are ok: of quantities over the grid, and over its
-    axes other than the frequency or the speed of a curve: `peak_amplitude`, its highest mean [m], `reduction`, what the
-    bodies take of the maximum without bodies, and the highest stress, wear and so on"""
+    axes other than the frequency or the speed of a curve: `peak_amplitude`, its highest mean [m], `reduction`, the
+    reduction of the maximum without bodies, and the highest stress, wear and so on"""
     indices: Annotated[Mapping[str, np.ndarray], Columns(_fractions, ("index", "number"), "indices_")]
-    """(4, d, ...) Sobol' indices INDICES of those results that have any: the fraction of the variance that a number
-    causes by itself, and with others, and half widths of their 95 % confidence intervals; nan where nothing spreads"""
+    """(4, d, ...) Sobol' indices INDICES of those results that have any: the fraction of the variance that a parameter
+    causes without and with interactions, and half widths of their 95 % confidence intervals; nan without spread"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """versions and further data of the caller (JSON-able)"""
 

@@ -19,7 +19,7 @@ def impacts_per_period(impacts: Any, counted: Any) -> Any:
 def attached_mass_fraction(
     harmonic: Any, momentum: Any, momentum_change: Any, load: Any, carried: Any, omega: Any, counted: Any, period: Any
 ) -> Any:  # fmt: skip
-    """fraction of the bodies' mass that the structure feels at the excitation's frequency: Re(F / (omega^2 X)) / sum m
+    """fraction of the bodies' mass attached to the structure at the excitation's frequency: Re(F / (omega^2 X)) / sum m
     of the contact forces' part F; unknown without bodies or motion"""
     share = 2.0 / (counted * period)
     x, y = share * harmonic.real, share * harmonic.imag

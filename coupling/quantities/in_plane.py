@@ -23,7 +23,7 @@ def lift_share(lifted: Any, counted: Any, period: Any) -> Any:
 
 @quantity("1", ("damper",))
 def linearisation(tilt: Any, neglected: Any) -> Any:
-    """what small tilts neglect over the smallest play, for each body"""
+    """error of small tilts over the smallest clearance, for each body"""
     return neglected * tilt**2
 
 

@@ -38,7 +38,7 @@ class Status(StrEnum):
     """How a run ended. Without `ok` the results cover only the periods that were completed."""
 
     OK = "ok"
-    """all periods done, or steady to the tolerance asked for"""
+    """all periods done, or steady to the required tolerance"""
     EVENT_BUDGET = "event_budget"
     """`solver.max_events` events without reaching the end"""
     ACCURACY_LOST = "accuracy_lost"
@@ -54,10 +54,10 @@ class Status(StrEnum):
     DIVERGED = "diverged"
     """the motion grew beyond all bounds; amplitudes and energies are nan"""
     TILTED = "tilt_too_large"
-    """bodies tilt so far that what small tilts neglect exceeds `solver.linearisation`"""
+    """bodies tilt so far that the error of small tilts exceeds `solver.linearisation`"""
     ENERGY = "energy_not_balanced"
-    """the ledger of energy is open by more than the method's bound, or impacts or contacts have made energy: the
-    figures are not to be used"""
+    """the energy imbalance exceeds the method's bound, or impacts or contacts have generated energy: do not use the
+    results"""
     NOT_STEADY = "not_steady"
     """no end of the transient in sight, or `time.transient` is too short for it; the figures are those of the periods
     evaluated"""
@@ -75,7 +75,7 @@ class Event:
     """what happened: "impact"; "stick" and "slip" on the floor or of a friction damper; "rest" at a wall or a
     neighbour, and "detach" from it"""
     damper: int
-    """number of the body, from 0; of a stop, a friction damper or another element of the structure its own number"""
+    """index of the body, from 0; for a stop, a friction damper or another element of the structure its own index"""
     side: str
     """"left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction damper,
     "stop" for a stop; of other elements the name of their table"""
@@ -86,11 +86,11 @@ class Event:
     impulse: Annotated[float, Unit("N s")]
     """impulse along the normal"""
     corner: int = -1
-    """corner of a body, from 0 (of a block 0 to 3) against the clock from the lower left one; -1: none"""
+    """corner of a body, from 0 (of a block 0 to 3) counterclockwise from the lower left one; -1: none"""
     tangential_impulse: Annotated[float, Unit("N s")] = 0.0
     """impulse of friction"""
     loss: Annotated[float, Unit("J")] = 0.0
-    """energy that the impulses of an impact take, without what completes a chatter"""
+    """energy that the impulses of an impact take, without the completion of a chatter"""
 
 
 def _written(contacts: Sequence[tuple[int, str, int]]) -> dict[str, Variable]:
@@ -212,15 +212,15 @@ class Response(Measured, Record, Plotted):
     coordinates: Annotated[np.ndarray | None, Array(("time", "mode"), "kg^0.5 m")] = None
     """samples of a reduced model's mass-normalised modal coordinates; None without"""
     contact_work: Annotated[tuple[ContactWork, ...] | None, Own()] = None
-    """work of friction and impacts of each contact; None without [wear]"""
+    """work of friction and impacts of each contact; without `[wear]` None"""
     wear: tuple[ContactWear, ...] | None = None
-    """wear of each contact, at the mean rates of the evaluated periods; None without [wear]"""
+    """wear of each contact, at the mean rates of the evaluated periods; without `[wear]` None"""
     stress: Annotated[tuple[SpotStress, ...] | None, Own()] = None
     """stress at the hot spots of a reduced model; None without any [Pa]"""
     sectors: Annotated[SectorResponse | None, Own()] = None
     """response of each sector of a ring; None for other structures"""
     contacts: Annotated[tuple[ContactStrength, ...] | None, Named("contact_strength")] = None
-    """largest forces and pressures of the impacts of each contact; None without a rounded [contact.pair]"""
+    """largest forces and pressures of the impacts of each contact; without a rounded `[contact.pair]` None"""
     lyapunov: dict[str, Any] | None = None
     """Lyapunov exponents of the motion after the run (vanedamp.lyapunov), if they were asked for [1/s]"""
     scene: Annotated[Scene | None, Own()] = None

@@ -11,10 +11,10 @@ import numpy as np
 
 #: reasons why derivatives do not have what some quantities need, by names of sources (arguments of their formulas)
 NOT_IN_DERIVATIVES: dict[str, str] = {
-    "confidence": "tells how well a mean is known, not the motion",
+    "confidence": "is no property of the motion",
     "unbalanced": "is round-off, a check of the run",
     "overlap": "the exact engine enters no rigid wall: it is 0",
-    "neglected": "bounds an error of the model, and is none of the motion",
+    "neglected": "bounds an error of the model, not of the motion",
     **dict.fromkeys(("undamped", "fixed"), "is of the linear structure: take differences of its curve, without runs"),
     **dict.fromkeys(("undamped_top", "fixed_top"), "is of a curve over the frequency, not of one motion"),
     "stress": "is not differentiated: take differences of runs, whose stress is exact",

@@ -8,9 +8,9 @@ from vanedamp.coupling.quantities import stress
 from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_max_dynamic
 from vanedamp.coupling.quantities.quantity import declared_in
 
-_ENDLESS, _FREE = "is of a motion that goes on as it is", "nothing excites the motion"
+_ENDLESS, _FREE = "is of a lasting motion", "nothing excites the motion"
 _NOT_STEADY = {
-    "confidence": "there is no lasting mean about which periods scatter",
+    "confidence": "there is no constant mean about which periods scatter",
     "unbalanced": "is of the whole run: `energy_residual`",
     "overlap": "only the exact engine runs them, in which nothing overlaps",
     **dict.fromkeys(("lyapunov", "section", "slip", "slip_velocity", "transient"), _ENDLESS),
@@ -44,6 +44,6 @@ NOT_IN_RING_DOWNS = (
             **dict.fromkeys(("_undamped", "_fixed"), _FREE),
             **dict.fromkeys(("_mean", "_static"), "`strength` has the mean stress"),
         },
-        "the motion happens now and then: `strength` has the damage of one",
+        "`strength` has the damage of one decay",
     )
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+import re
 from collections.abc import Sequence
 from dataclasses import is_dataclass
 from enum import Enum
@@ -53,6 +54,8 @@ def fields_table(found: Sequence[Described]) -> nodes.table:
 
 #: fields that many records have, where they have no docstring
 _EVERYWHERE = {"provenance": "versions and further data of the caller (JSON-able)"}
+#: shape at the start of a docstring, which the dimensions give
+_SHAPE = re.compile(r"^\([^)]*\) ")
 
 
 class Described(NamedTuple):
@@ -73,7 +76,7 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
     layouts = declared(record) if is_dataclass(record) else {}
     for one in names or layouts or texts:
         kind, layout = layouts.get(one, (None, None))
-        text = texts.get(one, _EVERYWHERE.get(one, ""))
+        text = _SHAPE.sub("", texts.get(one, _EVERYWHERE.get(one, "")))
         if isinstance(layout, Within):
             found += described((get_args(kind) or (kind,))[0])
         elif isinstance(layout, Rows):

@@ -71,7 +71,7 @@ class Campbell(Record, Plotted):
 
     KIND: ClassVar[str] = "campbell"
     speeds: Annotated[np.ndarray, Array(("speed",), "rad/s", name="speed")]
-    """ascending: those asked for and those that following the modes took"""
+    """ascending: requested ones, and others needed to follow the modes"""
     asked: Annotated[np.ndarray, Array(("speed",), dtype=bool)]
     """whether a speed was asked for"""
     modes: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="mode")]

@@ -45,7 +45,7 @@ class Identified(Record):
     errors: Annotated[np.ndarray, Array(("sector",), name="error")]
     """their standard deviations, from the misfit; nan without more equations than deviations"""
     misfit: float
-    """root mean square of what the equations leave, relative to omega^2 beta"""
+    """root mean square residual of the equations, relative to omega^2 beta"""
     force: _Force = 0j
     """per unit of the responses' load as given, complex; 0 for natural modes [N]"""
     provenance: Mapping[str, Any] = field(default_factory=dict)

@@ -38,7 +38,7 @@ class CalibrationRecord(Record):
     cavity: Mapping[str, CavityMotion] = field(default_factory=dict)
     """how the mode moves the cavities"""
     warnings: Annotated[tuple[str, ...], Array(("warning",), attribute=True)] = ()
-    """what to look at"""
+    """to be read before results are used"""
     part: Annotated[tuple[str, ...], Array(("part",), dtype=object)] = ()
     """names of the tuned parts of the stiffness"""
     factor: _OfParts = field(default_factory=empty)
@@ -56,7 +56,7 @@ class CalibrationRecord(Record):
     mac_after: _OfTargets = field(default_factory=empty)
     """the same of the tuned model"""
     sensitivity: Annotated[np.ndarray, Array(("target", "part"))] = field(default_factory=empty)
-    """of the logarithms of frequencies to those of factors"""
+    """of the logarithms of frequencies to the logarithms of factors"""
     label: Annotated[tuple[str, ...], Array(("label",), dtype=object)] = ()
     """names of the measured responses"""
     line: Annotated[np.ndarray, Array(("line",), "Hz")] = field(default_factory=empty)

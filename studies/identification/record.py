@@ -105,7 +105,7 @@ class Identification(Record, Plotted):
     status: IdentificationStatus
     """how it ended"""
     notes: tuple[str, ...]
-    """what to know before the numbers are used"""
+    """to be read before results are used"""
     sentence: str
     """the answer in words"""
     paths: tuple[str, ...]
@@ -113,7 +113,7 @@ class Identification(Record, Plotted):
     best: _OfNumbers
     """values with the least misfit"""
     covariance: Annotated[np.ndarray, Array(("number", "other_number"))]
-    """by Gauss and Newton; infinite of a number that nothing tells"""
+    """by Gauss and Newton; infinite for an undetermined parameter"""
     interval: Annotated[np.ndarray, Array(("number", "end"))]
     """95 % intervals by profile likelihood"""
     open: Annotated[np.ndarray, Array(("number", "end"), dtype=bool)]
@@ -129,19 +129,19 @@ class Identification(Record, Plotted):
     misfit: float
     """sum of squared residuals in standard deviations, with priors"""
     test: _Misfit
-    """what the misfit says of the model"""
+    """test of the model by the misfit"""
     minima: Annotated[np.ndarray, Array(("minimum", "number"))]
     """where the searches ended"""
     minima_misfit: Annotated[np.ndarray, Array(("minimum",))]
-    """what is left there"""
+    """their misfit"""
     channels: tuple[Mapping[str, str], ...]
     """names of what was measured"""
     deviation: Annotated[np.ndarray, Array(("channel",))]
     """standard deviations of the channels; of "ratio" relative"""
     estimated: Annotated[np.ndarray, Array(("channel",), dtype=bool)]
-    """whether the deviations are those of the residuals"""
+    """whether the deviations are estimated from the residuals"""
     data_channel: Annotated[np.ndarray, Array(("datum",), dtype=np.int64)]
-    """place of each datum in the channels"""
+    """channel of each datum, from 0"""
     data_at: _Data
     """Hz or s"""
     data_value: _Data
@@ -161,7 +161,7 @@ class Identification(Record, Plotted):
     scene: _Scene
     """with the best numbers"""
     proposal: _Proposal = None
-    """what further measurements would tell; None without a level"""
+    """benefit of further measurements; None without a level"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -24,9 +24,9 @@ class LifeRecord(Record):
     study: Mapping[str, Any]
     """the [life] table and the scene, as plain data"""
     reference: float
-    """amplitude without bodies in the band: its maximum, or its mean [m]; or the limit of what counts, in its unit"""
+    """amplitude without bodies in the band: its maximum, or its mean [m]; or the limit of the measure, in its unit"""
     contacts: tuple[Contact, ...]
-    """that wear: body, side and corner, area of the patch, share of the cavity"""
+    """that wear: body, side and corner, area of the patch, fraction of the cavity"""
     frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
     """of the band"""
     time: Annotated[np.ndarray, Array(("time",), "h")]
@@ -50,7 +50,7 @@ class LifeRecord(Record):
     lost: Annotated[np.ndarray, Array(("time", "damper"))]
     """fraction of each body that is worn away; nan where its size is not known"""
     reduction: _Moments
-    """of what counts of the band"""
+    """of the measure in the band"""
     reduction_band: _Moments
     """half width of it"""
     amplitude: Annotated[np.ndarray, Array(("time", "frequency"))]

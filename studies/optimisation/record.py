@@ -87,9 +87,9 @@ class Optimisation(Record):
     reference: float
     """amplitude without bodies in the band: its maximum, at the points or between them, or its mean [m]"""
     resonance_frequency: float
-    """of the resonance that X and mass are of [Hz]"""
+    """of the resonance to which X and mass belong [Hz]"""
     nominal: _Optimum
-    """the best design as it is"""
+    """the best design without deviations"""
     robust: _Optimum
     """the best within the tolerances"""
     map_mass_ratio: Annotated[np.ndarray, Array(("map_mass_ratio",))]
@@ -97,11 +97,11 @@ class Optimisation(Record):
     map_gap_ratio: Annotated[np.ndarray, Array(("map_gap_ratio",))]
     """gap over X"""
     map_amplitude: Annotated[np.ndarray, Array(("map_mass_ratio", "map_gap_ratio"))]
-    """of designs as they are, with the bodies of `nominal`"""
+    """of designs without deviations, with the bodies of `nominal`"""
     history_design: Annotated[np.ndarray, Array(("evaluation", "variable"))]
     """designs in the order in which they were tried"""
     history_amplitude: _Tried
-    """what each counts by, over the reference; beyond its limits 1 plus the excess"""
+    """objective of each, over the reference; beyond its limits 1 plus the excess"""
     history_robust: _Tried
     """whether an amplitude is within the tolerances (1) or as designed (0)"""
     frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
@@ -123,7 +123,7 @@ class Optimisation(Record):
     starts: Mapping[str, Any] = field(default_factory=dict)
     """worst of these designs over starts (worst_start.worst_start), by the same names"""
     gradient: Mapping[str, Any] = field(default_factory=dict)
-    """where derivatives led the best design as designed (gradient.descend)"""
+    """refinement of the best design by derivatives (gradient.descend)"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def labels(self) -> dict[str, Any]:
