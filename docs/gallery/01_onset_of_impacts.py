@@ -1,11 +1,10 @@
 """
-Where impacts begin, and what they gain
-=======================================
+Onset of impacts and reduction
+==============================
 
-A loose body changes nothing until it hits the walls of its cavity. From the frequency at which impacts begin, the
-response leaves the curve of the cluster without bodies and follows that of the cluster with the body fixed in its
-cavity. Its resonance there is cut to half, and at the frequency of the old resonance hardly anything is left:
-*impact mistuning*.
+A loose body has no effect until it hits the walls of its cavity. From the frequency at which impacts begin, the
+response leaves the curve of the cluster without bodies and approaches the curve with the body fixed in its cavity. The
+maximum is halved, and at the original resonance hardly any vibration remains: *impact mistuning*.
 """
 
 import matplotlib.pyplot as plt
@@ -14,9 +13,8 @@ import numpy as np
 import vanedamp as vd
 
 # %%
-# A scene says what there is: the structure, the excitation, the cavities and the bodies in them. The table ``sweep``
-# names what is varied. ``resonance_amplitude`` sets the force so that the resonance without bodies has that
-# amplitude.
+# A scene describes the structure, the excitation, the cavities and the bodies in them. The table ``sweep`` lists the
+# varied parameters. ``resonance_amplitude`` sets the force so that the resonance without bodies has that amplitude.
 
 scene = vd.Scene(
     structure={"model": "rigid", "mass": 0.157, "stiffness": 3.605e7, "damping_ratio": 0.002},
@@ -29,8 +27,7 @@ scene = vd.Scene(
 result = vd.sweep(scene)
 
 # %%
-# The result has one array for each measure, in the shape of the grid. Points whose status is not "ok" are not to be
-# used.
+# The result has one array for each quantity, with the shape of the grid. Do not use points whose status is not "ok".
 
 assert np.all(result.status == "ok")
 frequency = result.axes["excitation.frequency"]
@@ -42,11 +39,11 @@ print(f"impacts begin at {onset:.0f} Hz, where the amplitude is {1e6 * result.am
 print(f"largest mean amplitude with the body: {result.amplitude_mean.max() / reference:.2f} of that")
 
 # %%
-# At 2366 Hz the run from rest does not find the impacts: there the body can float as well, as it does below the
-# onset.
+# At 2366 Hz the run from rest does not reach the motion with impacts: there the body can also float, as it does below
+# the onset.
 #
-# The attached mass fraction says how much of the body's mass the structure feels: 0 of a body that floats, 1 of one
-# that is fixed. Where the body hits both walls in every period it can be more than 1.
+# The attached mass fraction is 0 for a body that floats and 1 for a fixed body. If the body hits both walls in every
+# period it can exceed 1.
 
 figure, (top, bottom) = plt.subplots(2, sharex=True, figsize=(7.5, 6.5), layout="constrained", height_ratios=[2, 1])
 top.plot(frequency, 1e6 * result.amplitude_undamped, color="0.5", label="without bodies")

@@ -2,10 +2,10 @@
 How wide should the gap be?
 ===========================
 
-The gap is the first number to choose. Its measure is X, the amplitude of the resonance without bodies. A narrow gap
-carries the body along from the beginning, and only shifts the resonance. In a wide gap there are two answers: the
-body hits the walls, or it floats between them and does nothing. Which one comes depends on how the machine gets
-there, so a design is judged by the worse one.
+The gap is the first parameter to choose. It is measured relative to X, the amplitude of the resonance without bodies.
+In a narrow gap the body moves with the cavity from the beginning, and only shifts the resonance. In a wide gap there
+are two steady states: the body hits the walls, or it floats between them without effect. The start determines which one
+occurs, so a design is rated by the worse one.
 """
 
 import matplotlib.pyplot as plt
@@ -23,8 +23,9 @@ scene = vd.Scene(
 )
 
 # %%
-# A sweep over several axes is their product. Keys are the dotted paths of the scene's tables. The direction says how
-# a run begins: "independent" from rest, "up" and "down" with the last state of the frequency below or above.
+# A sweep over several axes covers all combinations. Keys are the dotted paths of the scene's tables. The direction
+# determines how a run begins: "independent" from rest, "up" and "down" with the last state of the frequency below or
+# above.
 
 gaps = X * np.array([1.5, 1.0, 0.7, 0.5, 0.3, 0.1])
 starts = ["independent", "up", "down"]
@@ -34,7 +35,7 @@ result = vd.sweep(scene.replace({"sweep": axes}))
 print("shape of the grid:", result.shape, "; all runs ok:", bool(np.all(result.status == "ok")))
 
 # %%
-# The highest mean amplitude over the band is what a designer compares.
+# A designer compares the highest mean amplitude in the band.
 
 peak = result.amplitude_mean.max(axis=2) / X
 print("gap over X  " + "  ".join(f"{start:>11}" for start in starts))

@@ -1,10 +1,10 @@
 """
-What friction and restitution change
-====================================
+Effect of friction and restitution
+==================================
 
-Restitution is the share of its speed that a body keeps in an impact, and friction acts between the body and the
-floor. Neither is known well. So ask first how much they matter: at 2400 Hz and 70 µm the floor's acceleration is
-1600 times gravity, and friction by the body's weight is nothing beside it.
+Restitution is the fraction of its speed that a body keeps in an impact, and friction acts between the body and the
+floor. Neither is known accurately, so their effect should be known first: at 2400 Hz and 70 µm the acceleration of the
+floor is 1600 times gravity, and friction due to the body's weight is negligible.
 """
 
 import matplotlib.pyplot as plt
@@ -31,7 +31,7 @@ weight = vd.sweep(scene.replace({"sweep": axes}))
 
 # %%
 # A spring or, on a rotor, the centrifugal load presses the body on its floor with much more than its weight.
-# ``normal_load`` replaces the weight by that force. Here it is the axis of the sweep, with the friction at 0.4.
+# ``normal_load`` replaces the weight by that force. Here it is the axis of the sweep, with a friction of 0.4.
 
 loads = [0.03, 3.0, 10.0, 30.0]
 pressed = vd.sweep(
@@ -39,7 +39,7 @@ pressed = vd.sweep(
 )
 
 # %%
-# Each field of a map is the highest mean amplitude over the band.
+# Each field of the map is the highest mean amplitude in the band.
 
 figure, panels = plt.subplots(1, 2, figsize=(9.5, 3.9), layout="constrained", sharey=True)
 names = ["friction coefficient (-), body pressed by its weight", "normal load (N), friction 0.4"]
@@ -57,7 +57,7 @@ figure.colorbar(image, ax=panels, label="highest mean amplitude over X (-)")
 plt.show()
 
 # %%
-# Spread over the friction, at restitution 0.65, and over the normal load.
+# Range over the friction, at restitution 0.65, and over the normal load.
 
 for name, result in (("friction", weight), ("normal load", pressed)):
     peak = result.amplitude_mean.max(axis=-1)[:, 3] / X

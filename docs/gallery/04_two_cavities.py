@@ -2,9 +2,9 @@
 Two cavities
 ============
 
-Several small bodies in cavities of their own need not do the same as one large body. Here the same mass is in one
-body, in two bodies with equal gaps, and in two bodies with different gaps. Two equal bodies move together and do
-what the one does; with different gaps the impacts of one begin before those of the other.
+Several small bodies in separate cavities need not act like one large body. Here the same mass is in one body, in two
+bodies with equal gaps, and in two bodies with different gaps. Two equal bodies move together and act like one; with
+different gaps, the impacts of one begin before the impacts of the other.
 """
 
 import matplotlib.pyplot as plt

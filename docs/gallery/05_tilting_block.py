@@ -1,9 +1,9 @@
 """
-A block that tilts, beside a slider
-===================================
+A tilting block compared with a slider
+======================================
 
-A slider is a point of mass that only moves along its cavity. A real body has an extent: it hits a wall with a
-corner, and it tilts and lifts in the play above it, and goes from corner to corner.
+A slider is a point mass that only moves along its cavity. A real body has length and height: it hits a wall with a
+corner, it tilts and lifts in its transverse clearance, and it rocks from corner to corner.
 """
 
 import matplotlib.pyplot as plt
@@ -23,8 +23,8 @@ scene = vd.Scene(
 block = scene.replace({"damper.0.shape": "block", "damper.0.length": 6.88e-3, "damper.0.height": 4.8e-3})
 
 # %%
-# The same sweep for both. The block is 6.9 mm long and 4.8 mm high, with a play of 0.2 mm above it. The cavity of the
-# shipped cluster turns by 5.25 rad per metre of its motion, which tilts a block that lies flat.
+# The same sweep for both. The block is 6.9 mm long and 4.8 mm high, with a clearance of 0.2 mm above it. The cavity of
+# the shipped cluster rotates by 5.25 rad per metre of its motion, which tilts an aligned block.
 
 runs = {"slider": vd.sweep(scene), "block": vd.sweep(block)}
 for name, result in runs.items():
@@ -42,7 +42,7 @@ plt.show()
 
 # %%
 # One run with samples shows how the block moves. ``in_plane`` has lift and tilt of every body. The block has left the
-# floor for good and flies from impact to impact.
+# floor permanently and flies from impact to impact.
 
 response = vd.simulate(block, samples_per_period=200)
 last = response.time > response.time[-1] - 4 / block.frequency

@@ -1,9 +1,9 @@
 """
-Under noise
-===========
+Noise excitation
+================
 
-In service the excitation is often noise. A multi-sine is noise that repeats itself: sines at neighbouring multiples
-of a low frequency with random phases. Its spectrum is exactly the given one, and the exact engine runs it.
+In service the excitation is often noise. A multi-sine is noise that repeats: sines at neighbouring multiples of a low
+frequency, with random phases. It has exactly the given spectrum, and the exact engine runs it.
 """
 
 import matplotlib.pyplot as plt
@@ -12,7 +12,7 @@ import numpy as np
 import vanedamp as vd
 
 # %%
-# 41 equal sines about the resonance, 24 Hz apart. The force is the root mean square of the signal.
+# 41 equal sines around the resonance, 24 Hz apart. The force is the root mean square of the signal.
 
 scene = vd.Scene(
     structure={"model": "rigid", "mass": 0.157, "stiffness": 3.605e7, "damping_ratio": 0.002},
@@ -31,7 +31,7 @@ runs = {
 }
 
 # %%
-# Its measure is the root mean square. The spectrum shows where the vibration goes.
+# The response is measured by its root mean square. The spectrum shows the frequencies of the vibration.
 
 figure, (top, bottom) = plt.subplots(2, figsize=(8, 6.5), layout="constrained")
 for name, response in runs.items():

@@ -3,7 +3,7 @@ Through the resonance at different rates
 ========================================
 
 A machine that starts passes its resonances. Without bodies, a fast run-up stays below the steady response and peaks
-late. With a loose body, it also matters from which side the resonance is passed.
+late. With a loose body, the direction of the passage also matters.
 """
 
 import matplotlib.pyplot as plt
@@ -20,7 +20,7 @@ scene = vd.Scene(
 ramps = {"with a body": vd.ramp(scene), "without bodies": vd.ramp(scene.replace({"damper": []}))}
 
 # %%
-# Each rate is a run of its own, in Hz per second; those downwards come after those upwards.
+# Each rate, in Hz per second, is a separate run; downward runs follow the upward runs.
 
 figure, panels = plt.subplots(1, 2, figsize=(10, 4.4), layout="constrained", sharey=True)
 for panel, (name, result) in zip(panels, ramps.items(), strict=True):

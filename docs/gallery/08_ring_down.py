@@ -1,9 +1,9 @@
 """
-Damping over the amplitude from a hammer blow
-=============================================
+Damping versus amplitude from a hammer blow
+===========================================
 
-Strike the structure once and let it ring: damping and frequency over the amplitude follow from one decay. The
-engine is exact between events, so nothing is filtered.
+Strike the structure once and let it vibrate freely: one decay gives damping and frequency versus amplitude. The engine
+is exact between events, so nothing is filtered.
 """
 
 import matplotlib.pyplot as plt
@@ -20,7 +20,7 @@ scene = vd.Scene(
 found = vd.ring_down(scene)
 
 # %%
-# A half cycle lies between two turning points. Bins of amplitude hold the mean damping with its 95 % confidence.
+# A half cycle lies between two turning points. Each bin of amplitude has the mean damping with its 95 % confidence.
 
 linear = found.linear
 print(f"status {found.status}; without bodies {linear.frequency:.1f} Hz, damping ratio {linear.damping_ratio:.4f}")

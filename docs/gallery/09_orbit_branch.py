@@ -1,9 +1,9 @@
 """
-A branch of periodic motions, stable and not
-============================================
+A branch of periodic motions, stable and unstable
+=================================================
 
-A sweep shows where runs end. A branch of periodic orbits shows why: it follows a motion over the frequency, whether
-it is stable or not, and finds where it loses its symmetry, doubles its period or turns back.
+A sweep shows where runs end. A branch of periodic orbits shows why: it follows a motion versus frequency, stable or
+not, and finds where it loses its symmetry, doubles its period or folds.
 """
 
 import matplotlib.pyplot as plt
@@ -12,8 +12,8 @@ import numpy as np
 import vanedamp as vd
 
 # %%
-# The table ``orbit`` says how far to follow. The body is thrown at the start, so that the run before the branch ends
-# with impacts.
+# The table ``orbit`` gives the range to follow. The body has an initial velocity, so that the run before the branch
+# ends with impacts.
 
 scene = vd.Scene(
     structure={"model": "rigid", "mass": 0.15696, "stiffness": 3.6046e7, "damping_ratio": 0.002},
@@ -31,7 +31,7 @@ for number, branch in enumerate(found.branches):
             print(f"  {point.parameter:.2f} Hz: {point.kind}")
 
 # %%
-# The points of a sweep lie on the stable parts. Where no motion of the branches is stable, they find another one.
+# The points of a sweep lie on the stable parts. Where no motion of the branches is stable, runs reach another motion.
 
 sweep = vd.sweep(scene.replace({"orbit": None, "sweep": {"excitation.frequency": np.linspace(2300.0, 2368.0, 35)}}))
 figure, axes = plt.subplots(figsize=(8, 4.6), layout="constrained")
@@ -52,8 +52,8 @@ axes.set(
 axes.legend(loc="upper left")
 
 # %%
-# An orbit is stable while all of its multipliers are below one. ``neutral`` counts those that are one because the
-# body may be moved without a change, which come first.
+# An orbit is stable if the magnitudes of all its Floquet multipliers are below one. ``neutral`` is the number of
+# multipliers equal to one because the body can be displaced without effect; they come first.
 
 figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
 for number, branch in enumerate(found.branches):

@@ -2,8 +2,8 @@
 The best mass and gap
 =====================
 
-The optimisation seeks the mass and the gap that reduce the largest amplitude of a band most: as designed, and
-within the tolerances of what a workshop can hold. This is the same as ``vanedamp optimise STUDY.toml``.
+The optimisation searches for the mass and the gap with the largest reduction of the largest amplitude in a band: as
+designed, and within manufacturing tolerances. This is the same as ``vanedamp optimise STUDY.toml``.
 """
 
 import matplotlib.pyplot as plt
@@ -12,8 +12,8 @@ import numpy as np
 import vanedamp as vd
 
 # %%
-# A study is a scene with a table ``optimise``. Here the search is short; for a decision take more evaluations,
-# samples and frequencies.
+# A study is a scene with a table ``optimise``. Here the search is short; for a decision use more evaluations, samples
+# and frequencies.
 
 scene = vd.Scene(
     structure={"model": "rigid", "mass": 0.157, "stiffness": 3.605e7, "damping_ratio": 0.002},
@@ -39,8 +39,8 @@ best = vd.optimise(study)
 print(best.sentence)
 
 # %%
-# The map shows designs as they are, each from rest. Beside an edge of the map a small error of the gap costs much,
-# and the robust optimum keeps away from it.
+# The map shows designs without deviations, each from rest. Near an edge of the map a small error of the gap costs much,
+# and the robust optimum avoids it.
 
 figure, axes = plt.subplots(figsize=(7.5, 4.8), layout="constrained")
 reduction = 100 * (1 - best.map_amplitude)

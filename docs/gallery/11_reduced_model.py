@@ -2,9 +2,9 @@
 A reduced model of the shipped mesh
 ===================================
 
-A reduced model keeps the cavity's interface and a few modes of the mesh. How many modes does the response of a
-loose body need? Here with linear elements, so that it takes seconds. They are too stiff: with quadratic ones the
-first bending is at 2412 Hz.
+A reduced model keeps the cavity's interface and a few modes of the mesh. How many modes does the response of a loose
+body require? This example uses linear elements, so that it takes seconds. They are too stiff: with quadratic elements
+the first bending is at 2412 Hz.
 """
 
 from importlib.resources import files
@@ -31,7 +31,7 @@ print(f"{len(matrices.free)} degrees of freedom, {matrices.total_mass:.3f} kg")
 
 # %%
 # Craig-Bampton reduction: static shapes of the two coordinates and some fixed-interface modes. The receptance at the
-# cavity, with the error against a model of many more modes.
+# cavity, with the error compared with a model of many more modes.
 
 hertz = np.linspace(1000.0, 9000.0, 600)
 reference = vd.reduce(matrices, interface, modes=60)
@@ -51,8 +51,8 @@ bottom.set(xlabel="frequency (Hz)", ylabel="error over the largest receptance (-
 plt.show()
 
 # %%
-# A scene takes a reduced model as its structure. Its contact is a spring, since impacts without duration have no limit
-# as modes are added.
+# A scene takes a reduced model as its structure. Its contact is a spring, since results with impacts of zero duration
+# do not converge as modes are added.
 
 first = reference.natural_frequencies_hz[0]
 figure, axes = plt.subplots(figsize=(7.5, 4), layout="constrained")

@@ -2,8 +2,8 @@
 A Campbell diagram
 ==================
 
-Rotation stiffens a blade, so its natural frequencies rise with the speed. Where an engine order meets one of them,
-the blade resonates.
+Rotation stiffens a blade, so its natural frequencies rise with the speed. The blade resonates where an engine order
+crosses one of them.
 """
 
 import matplotlib.pyplot as plt
@@ -12,8 +12,8 @@ import numpy as np
 import vanedamp as vd
 
 # %%
-# A case says what is meshed, of what it is made and how it is held. This one is a small blade of parameters; the axis
-# of rotation lies 150 mm below its root. ``assemble`` gives its matrices, at standstill and in rotation.
+# A case describes the mesh, the materials and the supports. This one is a small parametric blade; the axis of rotation
+# lies 150 mm below its root. ``assemble`` gives its matrices, at standstill and in rotation.
 
 case = vd.Case(
     mesh={"generator": "block", "length": 0.19, "width": 0.05, "thickness": 0.004, "divisions": [12, 4, 1]},
@@ -26,7 +26,7 @@ rpm = np.linspace(0.0, 15000.0, 31)
 diagram = vd.campbell(structure.rotating, rpm * np.pi / 30, orders=[1, 2, 3, 4, 5, 6], count=4)
 
 # %%
-# Modes are followed by their shapes. Where two of them come close they may cross, or veer and exchange their shapes.
+# Modes are followed by their shapes. If two of them come close they may cross, or veer and exchange their shapes.
 
 for crossing in diagram.crossings:
     print(

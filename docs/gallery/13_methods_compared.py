@@ -1,9 +1,9 @@
 """
-The exact engine beside time steps
-==================================
+The exact engine compared with time stepping
+============================================
 
-The exact engine finds every impact. A time-stepping method looks once a step. Moreau's method with 200 and 2000
-steps a period shows what that costs and what it misses.
+The exact engine finds every impact. A time-stepping method checks once per step. Moreau's method with 200 and 2000
+steps per period shows the cost and the missed impacts.
 """
 
 import matplotlib.pyplot as plt
@@ -26,8 +26,8 @@ solvers = {
 }
 
 # %%
-# At 2360 Hz the motion has a period, so that every method should end in the same one. The energy residual is what a
-# method's own energy balance lacks.
+# At 2360 Hz the motion is periodic, so every method should end in the same motion. The energy residual is the imbalance
+# of a method's own energy balance.
 
 runs = {
     name: vd.simulate(scene.replace({"solver": solver}), samples_per_period=200) for name, solver in solvers.items()
@@ -42,8 +42,8 @@ for name, run in runs.items():
     )
 
 # %%
-# Left: the last two periods. Right: a sweep from rest. Where several motions are possible, steps that are too large
-# lead to another one: with 200 steps a period, the body hits the walls at frequencies at which it would float.
+# Left: the last two periods. Right: a sweep from rest. If several motions are possible, steps that are too large lead
+# to another one: with 200 steps per period, the body hits the walls at frequencies at which it would float.
 
 band = {"excitation.frequency": np.linspace(2330.0, 2430.0, 21)}
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.4), layout="constrained")

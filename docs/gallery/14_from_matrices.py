@@ -12,7 +12,7 @@ import numpy as np
 import vanedamp as vd
 
 # %%
-# **1. Matrices** of a chain of four masses, fixed at its left end: kg, N/m and N s/m. They might also come from another
+# **1. Matrices** of a chain of four masses, fixed at its left end: kg, N/m and N s/m. They may also come from another
 # program.
 
 mass = np.diag([0.06, 0.05, 0.04, 0.03])
@@ -21,13 +21,13 @@ stiffness[-1, -1] = 2e6
 damping = 5e-6 * stiffness
 
 # %%
-# **2. The reduced model**. Labels name the coordinates that loads and bodies act on, by their number or by a row.
+# **2. The reduced model**. Labels name the coordinates for loads and bodies, by an index or by a row.
 
 model = vd.ReducedModel.from_matrices(mass, stiffness, {"tip": 3, "pocket": [0.0, 0.5, 0.5, 0.0]}, damping=damping)
 model
 
 # %%
-# **3. Its receptance** at the tip. The first mode is to be reduced.
+# **3. Its receptance** at the tip. The aim is to reduce the first mode.
 
 hertz = np.linspace(100.0, 2000.0, 2000)
 figure, axes = plt.subplots(figsize=(7.5, 3), layout="constrained")
@@ -37,7 +37,7 @@ plt.show()
 
 # %%
 # **4. The scene** takes the model as its structure. A cavity at "pocket" holds a body of 5 g. The contacts are springs,
-# since a collision of a flexible structure takes time.
+# since a collision on a flexible structure takes time.
 
 first = model.natural_frequencies_hz[0]
 scene = vd.Scene(
@@ -51,7 +51,7 @@ scene = vd.Scene(
 scene
 
 # %%
-# **5. A wrong key** is an error that names the right one.
+# **5. A wrong key** causes an error that names the correct one.
 
 try:
     scene.replace({"cavity.c1.gapp": 50e-6})
@@ -76,7 +76,7 @@ axes.legend(loc="upper right")
 plt.show()
 
 # %%
-# **8. A sweep** over the frequency. ``workers=2`` shares the points among processes; ``progress=True`` shows a bar.
+# **8. A sweep** over the frequency. ``workers=2`` distributes the points over processes; ``progress=True`` shows a bar.
 
 result = vd.sweep(scene.replace({"sweep": {"excitation.frequency": np.linspace(0.95, 1.02, 29) * first}}))
 result
@@ -94,9 +94,9 @@ axes.legend()
 plt.show()
 
 # %%
-# **10. The bifurcation diagram**: where the body is in its cavity at the start of each period, once per period. A
-# periodic motion gives one point, a doubled period two, a non-periodic motion many. Each run starts with the final
-# state of the run before.
+# **10. The bifurcation diagram**: the position of the body in its cavity at the start of each period. A periodic motion
+# gives one point, a doubled period two, a non-periodic motion many. Each run starts with the final state of the
+# previous run.
 
 figure, axes = plt.subplots(figsize=(7.5, 4), layout="constrained")
 last = None

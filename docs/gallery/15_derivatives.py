@@ -1,9 +1,9 @@
 """
-What every number does
-======================
+Derivatives by parameters
+=========================
 
-An orbit of the exact engine has exact derivatives by all numbers of its scene, through impacts, sticking and slipping.
-One call says which number matters, and how far a tolerance carries.
+An orbit of the exact engine has exact derivatives by all parameters of its scene, through impacts, sticking and
+slipping. One call shows which parameters matter, and the effect of tolerances.
 """
 
 import matplotlib.pyplot as plt
@@ -12,7 +12,7 @@ import numpy as np
 import vanedamp as vd
 
 # %%
-# The cluster of the orbits' page between its limits of stability: the body hits each wall once per period.
+# The cluster of the page on orbits, between its limits of stability: the body hits each wall once per period.
 
 scene = vd.Scene(
     structure={"model": "rigid", "mass": 0.15696, "stiffness": 3.6046e7, "damping_ratio": 0.002},
@@ -31,7 +31,7 @@ found = vd.sensitivity(orbit, list(numbers))
 print(found.status, f"{1e6 * found.values['amplitude_mean']:.3f} µm")
 
 # %%
-# Relative changes: by how many per cent the amplitude changes where a number changes by one per cent.
+# Relative changes: the change of the amplitude in per cent if a parameter changes by one per cent.
 
 values = np.array([70.2e-6, 35.1e-6, 3.1392e-3, 0.5, 0.4, 0.002])
 relative = found.derivatives["amplitude_mean"] * values / found.values["amplitude_mean"]
@@ -42,7 +42,7 @@ axes.axvline(0.0, color="0.3", linewidth=0.8)
 axes.set(xlabel="change of the mean amplitude (%) per change of the number (%)", ylabel="number (-)")
 
 # %%
-# The derivative is the tangent of what runs find.
+# The derivative is the tangent to the results of runs.
 
 gaps = np.linspace(32.0e-6, 35.2e-6, 9)
 runs = [vd.simulate(scene.replace({"cavity.c1.gap": float(gap), "orbit": None})).amplitude_mean for gap in gaps]

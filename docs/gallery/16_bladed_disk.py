@@ -2,8 +2,8 @@
 Loose bodies in the blades of a disk
 ====================================
 
-A disk of twelve hollow blades, from the mesh of one sector: its waves, the amplification by mistuning, and what a loose
-body takes of it in every blade, in every second one, or only in the worst.
+A disk of twelve hollow blades, computed from the mesh of one sector: its waves, the amplification by mistuning, and the
+reduction by a loose body in every blade, in every second one, or only in the worst one.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +14,8 @@ from vanedamp.coupling.scene.mistuning import Mistuning
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
 
 # %%
-# **The sector** is a wedge of the disk with one blade, which has a cavity near its tip. Its faces `low` and `high` meet
-# those of its neighbours.
+# **The sector** is a wedge of the disk with one blade, which has a cavity near its tip. Its faces `low` and `high` are
+# joined to the faces of its neighbours.
 
 case = vd.Case(
     mesh={
@@ -46,9 +46,9 @@ axes.legend()
 plt.show()
 
 # %%
-# **Mistuning**: the blades of the first family hardly feel each other, so that small deviations of their stiffness keep
-# a wave in few of them. Of a hundred drawn disks under engine order 4, most have a blade that moves more than any
-# blade of the tuned disk. Whitehead's bound says how much more is possible at all.
+# **Mistuning**: in the first family the blades are almost uncoupled, so small deviations of their stiffness confine a
+# wave to a few of them. In most of a hundred drawn disks under engine order 4, one blade moves more than any blade of
+# the tuned disk. Whitehead's bound is the largest possible amplification.
 
 ring = ring_reduction(structure, families=2)
 draws = vd.mistuning_study(ring, Mistuning(frequency={"std": 0.0005}), [4], 100, "tip")
@@ -62,8 +62,8 @@ plt.show()
 print(f"median {np.median(factors):.2f}, largest {factors.max():.2f} (seed {worst}), bound {draws.bound:.2f}")
 
 # %%
-# **The scene**: engine order 4 bends the blades, each a little later than the one before. A cavity and its body are
-# written once; `sectors` says which blades have them. The force would bring the tuned disk to 0.2 mm.
+# **The scene**: engine order 4 bends the blades, each a little later than the previous one. A cavity and its body are
+# written once; `sectors` selects the blades that have them. The force would bring the tuned disk to 0.2 mm.
 
 near = [float(factor * draws.tuned_frequency_hz[0]) for factor in (0.975, 1.01)]
 scene = vd.Scene(
@@ -109,6 +109,6 @@ for name, values in tops.items():
     print(name, {label: round(value, 3) for label, value in values.items()})
 
 # %%
-# **Verdicts.** A body in every blade takes more than two thirds of the amplitude, and as much of a mistuned disk as of
-# the tuned one: its impacts dissipate where the wave is, wherever that is. A body in every second blade, or in the one
-# that moves most, helps hardly: the blades without one go on, and the bodies' masses mistune the disk by themselves.
+# **Result.** A body in every blade reduces the amplitude by more than two thirds, in a mistuned disk by as much as in
+# the tuned one: its impacts dissipate energy wherever the wave is. A body in every second blade, or only in the blade
+# that moves most, hardly helps: blades without a body still vibrate, and the masses of the bodies mistune the disk.

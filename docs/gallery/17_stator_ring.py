@@ -2,9 +2,9 @@
 A stator ring of vane clusters
 ==============================
 
-Twenty clusters of vanes in a casing, whose inner shrouds touch: a ring of separate structures that springs couple. Each
-cluster has a loose body in its shroud. The wave of an engine order leaves the curve without bodies and drops to that of
-bodies fixed, as one cluster does.
+Twenty clusters of vanes in a casing, whose inner shrouds are in contact: a ring of separate structures coupled by
+springs. Each cluster has a loose body in its shroud. The wave of an engine order leaves the curve without bodies and
+drops to the curve with bodies fixed, as for a single cluster.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +14,8 @@ import vanedamp as vd
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
 
 # %%
-# **The ring**: the cluster of parameters spans 18 degrees. The springs stand for the contact of neighbouring shrouds;
-# they act on the mean displacements of the end faces, stiff along the circumference.
+# **The ring**: the parametric cluster spans 18 degrees. The springs represent the contact of neighbouring shrouds; they
+# act on the mean displacements of the end faces and are stiff in the circumferential direction.
 
 case = vd.Case(
     mesh={"generator": "vane_cluster", "pitch_deg": 4.5, "element_size": 0.006},
@@ -41,7 +41,7 @@ axes.set(xlabel="nodal diameter (-)", ylabel="first bending (Hz)")
 plt.show()
 
 # %%
-# **Bodies in all clusters** under the engine order of the 8 struts upstream, which excites eight nodal diameters only.
+# **Bodies in all clusters** under the engine order of the 8 upstream struts, which excites only eight nodal diameters.
 # The force would bring the ring to 0.1 mm.
 
 order = 8
@@ -74,12 +74,12 @@ panels[0].legend()
 plt.show()
 
 # %%
-# **What the bodies take**: peaks of the largest cluster, in those of the tuned ring without bodies.
+# **Reduction**: peaks of the cluster with the largest amplitude, relative to the tuned ring without bodies.
 
 for name, result in (("tuned", tuned), ("mistuned", mistuned)):
     tops = [float(result.sectors[f"sector_amplitude_{key}"].max()) / 1e-4 for key in ("undamped", "mean", "fixed")]
     print(f"{name}: no bodies {tops[0]:.2f}, loose {tops[1]:.2f}, fixed {tops[2]:.2f}")
 
 # %%
-# **Verdicts.** Loose bodies in the clusters take three quarters of the peak and more; fixed ones only shift it. The
-# mistuned ring without bodies has a cluster that moves more than in the tuned one; with loose bodies that is gone.
+# **Result.** Loose bodies reduce the peak by three quarters or more; fixed ones only shift it. In the mistuned ring
+# without bodies one cluster moves more than in the tuned ring; with loose bodies this is no longer so.
