@@ -26,9 +26,7 @@ def run(arguments: Namespace) -> None:
     print_resonance(arguments.input, study.scene)
     started = time.perf_counter()
     with workers(arguments.workers) as pool:
-        compile_engine(
-            map(study.with_bodies, range(study.table.variables.bodies[0], study.table.variables.bodies[1] + 1)), pool
-        )
+        compile_engine(map(study.with_bodies, study.counts), pool)
         with progress("optimise") as report:
             optimisation = optimise(study, pool, report, {"versions": versions()}, arguments.checkpoint)
     write_timed(arguments, optimisation, started, _summary, study.doubts)
