@@ -68,9 +68,8 @@ class Optimum:
     @classmethod
     def of(cls, data: Mapping[str, Any], _path: str = "") -> Optimum:
         """Return the record of `to_json`."""
-        design = {name: data[name] for name in ("mass_ratio", "gap_ratio", "bodies")}
-        design = Design.of(design | data.get("numbers", {}))
-        return cls(design, data["amplitude"], data["amplitude_tolerances"], data.get("estimate", {}))
+        design = {name: data[name] for name in ("mass_ratio", "gap_ratio", "bodies")} | data.get("numbers", {})
+        return cls(Design.of(design), data["amplitude"], data["amplitude_tolerances"], data.get("estimate", {}))
 
 
 _Optimum = Annotated[Optimum, Coded(Optimum.to_json, Optimum.of)]

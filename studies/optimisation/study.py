@@ -29,7 +29,9 @@ from vanedamp.studies.optimisation.tables import Optimise, StudyFile
 #: points along a variable without an axis of the map
 _ALONG = 9
 #: at the start of a run, of a body like the scene's first one
-_AT_REST = {"position": None} | dict.fromkeys(("velocity", "lift", "lift_velocity", "tilt", "tilt_rate"), 0.0)
+_AT_REST: dict[str, Any] = {"position": None} | dict.fromkeys(
+    ("velocity", "lift", "lift_velocity", "tilt", "tilt_rate"), 0.0
+)
 
 
 class Study(NamedTuple):
@@ -126,10 +128,10 @@ class Study(NamedTuple):
     @property
     def map_axes(self) -> tuple[np.ndarray, np.ndarray]:
         """Mass ratios and gap ratios of the map; none without one."""
-        variables, size = self.table.variables, self.table.map
-        if not variables.mapped:
+        masses, gaps, size = self.table.variables.mass_ratio, self.table.variables.gap_ratio, self.table.map
+        if masses is None or gaps is None:
             return np.empty(0), np.empty(0)
-        return np.linspace(*variables.mass_ratio, size.mass_ratio), np.linspace(*variables.gap_ratio, size.gap_ratio)
+        return np.linspace(*masses, size.mass_ratio), np.linspace(*gaps, size.gap_ratio)
 
     def places(self, name: str) -> np.ndarray:
         """Return values of a variable along which the best design is drawn."""

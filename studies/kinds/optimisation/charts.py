@@ -32,7 +32,7 @@ def optimisation_figure(record: Optimisation) -> go.Figure:
         ("robust optimum", record.robust, "star", "#f97316"),
     ):
         figure.add_scatter(
-            x=[100 * optimum.design.mass_ratio], y=[optimum.design.gap_ratio], mode="markers",
+            x=[100 * (optimum.design.mass_ratio or 0.0)], y=[optimum.design.gap_ratio], mode="markers",
             name=f"{name}: {_format_optimum(optimum)}", hovertext=_format_optimum(optimum), hoverinfo="text+name",
             marker={"symbol": symbol, "size": 15, "color": colour, "line": {"color": "#111827", "width": 1.5}},
         )  # fmt: skip
