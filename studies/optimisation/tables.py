@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.scene import Scene
@@ -93,6 +93,10 @@ class Relative:
     """over the number of the design [-]"""
 
 
+def _form(value: Any) -> str:
+    return "table" if isinstance(value, Mapping | Relative) else "number"
+
+
 @dataclass(frozen=True, config=STRICT, repr=False)
 class Tolerances(ByPath):
     """Half widths of what the design cannot hold.
@@ -101,7 +105,9 @@ class Tolerances(ByPath):
     {relative = 0.03}.
     """
 
-    KIND: ClassVar[Any] = NonNegative | Relative
+    KIND: ClassVar[Any] = Annotated[
+        Annotated[NonNegative, Tag("number")] | Annotated[Relative, Tag("table")], Discriminator(_form)
+    ]
     mass: _Share = 0.0
     """of the mass of a body, relative [-]"""
     gap: _Share = 0.0
