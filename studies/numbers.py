@@ -122,5 +122,7 @@ class ByPath(OpenRecord):
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         made = super().__get_pydantic_json_schema__(schema, handler)
-        handler.resolve_ref_schema(made)["additionalProperties"] = handler(TypeAdapter(cls.KIND).core_schema)
+        table = handler.resolve_ref_schema(made)
+        table["additionalProperties"] = handler(TypeAdapter(cls.KIND).core_schema)
+        table["propertyNames"] = {"anyOf": [{"enum": list(table["properties"])}, {"pattern": r"\."}]}
         return made

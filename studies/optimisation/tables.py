@@ -41,14 +41,12 @@ Counts = Annotated[
 
 @dataclass(frozen=True, config=STRICT, repr=False)
 class Variables(ByPath):
-    """The variables of a design, each [lowest, highest], or one value, which holds it.
-
-    Further keys are dotted paths of numbers of the scene, such as "damper.0.friction", also with
-    {min, max, scale = "log"}. With these, what is not given is as the scene has it.
-    """
+    """The variables of a design, each [lowest, highest], or one value, which holds it."""
 
     KIND: ClassVar[Any] = Annotated[
-        Number, BeforeValidator(_number, json_schema_input_type=Real | tuple[Real, Real] | Number)
+        Number,
+        BeforeValidator(_number, json_schema_input_type=Real | tuple[Real, Real] | Number),
+        Field(description='number at a dotted path of the scene, such as "damper.0.friction" [unit of the number]'),
     ]
     mass_ratio: Bounds | None = None
     """mass of all bodies over that of the structure (default: 0.005 to 0.05, with paths as in the scene) [-]"""
@@ -99,14 +97,12 @@ def _form(value: Any) -> str:
 
 @dataclass(frozen=True, config=STRICT, repr=False)
 class Tolerances(ByPath):
-    """Half widths of what the design cannot hold.
-
-    Further keys are dotted paths of numbers of the scene: a half width in the unit of the number, or over it:
-    {relative = 0.03}.
-    """
+    """Half widths of what the design cannot hold."""
 
     KIND: ClassVar[Any] = Annotated[
-        Annotated[NonNegative, Tag("number")] | Annotated[Relative, Tag("table")], Discriminator(_form)
+        Annotated[NonNegative, Tag("number")] | Annotated[Relative, Tag("table")],
+        Discriminator(_form),
+        Field(description="of the number at a dotted path of the scene: in its unit, or {relative = 0.03}"),
     ]
     mass: _Share = 0.0
     """of the mass of a body, relative [-]"""
