@@ -76,6 +76,10 @@ def steady_slope(scene: Scene, paths: Sequence[str], measure: str, amplitude: fl
 def slope_of(orbit: Orbit, paths: Sequence[str], measure: str, some: bool) -> Slope | str:
     """Return the slope of an orbit, or the status of its derivatives."""
     found = sensitivity(orbit, paths)
-    if not (found.complete or (some and found.status is SensitivityStatus.OK)):
-        return (SensitivityStatus.UNDETERMINED if found.status is SensitivityStatus.OK else found.status).value
-    return Slope(found.values[measure], found.derivatives[measure], orbit, found.state_derivative)
+    if found.status is not SensitivityStatus.OK:
+        return found.status.value
+    known = np.isfinite(found.derivatives[measure]) & np.isfinite(found.state_derivative).all(axis=0)
+    if not (known.any() if some else known.all()):
+        return SensitivityStatus.UNDETERMINED.value
+    by_number = np.where(known, found.derivatives[measure], np.nan)
+    return Slope(found.values[measure], by_number, orbit, found.state_derivative)

@@ -184,6 +184,16 @@ def test_a_number_without_derivative_is_left_to_the_search():
     assert gap != 0.0 and friction == 0.0
 
 
+def test_a_friction_damper_that_rests_anywhere_has_no_tolerance_to_first_order():
+    """It sticks where it has come to rest, on which the amplitude depends; the scene has no loose bodies."""
+    scene = {"cavity": [], "damper": [], "friction_damper": [PLATE[0] | {"normal_force": 400.0}]}
+    variables, path = {"friction_damper.0.stiffness": [5e6, 1e7]}, "friction_damper.0.friction"
+    record = optimise(study(scene, variables=variables, tolerances={path: {"relative": 0.1}}))
+    assert record.trouble == 0 and 0.0 < record.nominal.amplitude < 0.5
+    assert set(record.gradient["without"]) == set(record.nominal.estimate["without"]) == {"undetermined"}
+    assert record.nominal.estimate["worst"] is None and record.gradient["steps"] == 0
+
+
 @pytest.mark.parametrize(
     "body",
     [
