@@ -200,8 +200,8 @@ class Study(NamedTuple):
         if design.gap_ratio is not None:
             found["gap_ratio"] = "cavity.gap", design.gap_ratio * self.amplitude, self.amplitude
         if design.mass_ratio is not None:
-            whole = self.mass / design.bodies
-            found["mass_ratio"] = "damper.mass", design.mass_ratio * self.mass / design.bodies, whole
+            mass = design.mass_ratio * self.mass / design.bodies
+            found["mass_ratio"] = "damper.mass", mass, self.mass / design.bodies
         return found
 
     def changes(self, design: Design) -> Changes:
