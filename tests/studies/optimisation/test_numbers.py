@@ -135,6 +135,27 @@ def test_three_numbers_of_different_tables(found, tmp_path, capsys):
     assert "<th>friction_damper.0.stiffness, N/m</th>" in page and 'download="optimum-0.csv"' in page
 
 
+def test_ratios_and_paths_together_have_a_map_and_sections(tmp_path):
+    """The first of one or two bodies has a restitution of its own; the tolerance moves all of them."""
+    cavity = [{"name": "c1", "gap": 2.5e-5}, {"name": "c2", "gap": 2e-5}]
+    variables = {"mass_ratio": [0.05, 0.1], "gap_ratio": 0.8, "bodies": [1, 2], "damper.0.restitution": [0.1, 0.5]}
+    case = study({"cavity": cavity}, variables=variables, tolerances={"restitution": 0.05, "cavity.c1.gap": 1e-6})
+    moved = case.scene_of(
+        Design.of({**case.middle.values, "bodies": 2}), {"restitution": 0.05, "cavity.c1.gap": 1e-6}, 2400.0
+    )
+    assert [body.restitution for body in moved.damper] == pytest.approx([0.35, 0.35])
+    assert [cavity.gap for cavity in moved.cavity] == pytest.approx([2.5e-5, 2.4e-5])
+    record = optimise(case, provenance={})
+    best = record.nominal.design
+    assert record.along == ("damper.0.restitution",) and record.map_amplitude.shape == (2, 2)
+    heavy = best._replace(mass_ratio=0.1)
+    assert record.map_amplitude[1, 0] == pytest.approx(worst(case, heavy), rel=1e-12)
+    record.save(tmp_path / "optimum.h5")
+    assert main(["report", str(tmp_path), "-o", str(tmp_path / "report.html")]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert 'download="optimum-1.csv"' in page and "<th>damper.0.restitution</th>" in page
+
+
 def test_a_tolerance_moves_each_body_from_its_own_number():
     two = [SCENE["damper"][0] | {"friction": 0.2, "position": -5e-6}, SCENE["damper"][0] | {"position": 5e-6}]
     case = study(
