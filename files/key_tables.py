@@ -87,7 +87,7 @@ def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[T
         own = others if isinstance(others, dict) and not _own_tables(schema, others) else None
         if "properties" in one or own is not None:
             free = () if own is None else (_key(schema, NAME, {"description": text} | own, False),)
-            said = one.get("description", text) if own is None else ""
+            said = "" if own is not None and "description" not in own else one.get("description", text)
             yield Table(path, heading, "".join(told.values()), said, _keys(schema, one, told) + free)
         yield from _inner(schema, one, path, text)
 

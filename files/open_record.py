@@ -39,14 +39,19 @@ class OpenRecord:
             raise ValueError("added: unknown key")
         further = [key for key in keys if key not in cls.__dataclass_fields__]
         types = cls.keys_added() if further else {}
-        schemas = {key: core_schema.typed_dict_field(_schema(types[key])) for key in further if key in types}
-        if not schemas:
+        own = {key: keys[key] for key in further if key in types}
+        if not own:
             return table
-        own = {key: keys[key] for key in schemas}
-        values = SchemaValidator(core_schema.typed_dict_schema(schemas)).validate_python(own)
         rest = {key: value for key, value in keys.items() if key not in own}
-        rest["added"] = (rest.get("added") or {}) | values
+        rest["added"] = (rest.get("added") or {}) | cls._validated(own, types)
         return ArgsKwargs(table.args, rest) if called else rest
+
+    @classmethod
+    def _validated(cls, values: Mapping[str, Any], types: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values of keys that other code adds, by their types. Raises pydantic's ValidationError."""
+        schemas = {key: core_schema.typed_dict_field(_schema(types[key])) for key in values}
+        found: dict[str, Any] = SchemaValidator(core_schema.typed_dict_schema(schemas)).validate_python(values)
+        return found
 
     @model_serializer(mode="wrap")
     def _write(self, handler: Any) -> dict[str, Any]:

@@ -35,7 +35,7 @@ KINDS = {
             command="identify",
         ),
         FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
-        FileKind("study", "vanedamp.studies.optimisation.study:StudyFile", ("optimise",), command="optimise"),
+        FileKind("study", "vanedamp.studies.optimisation.tables:StudyFile", ("optimise",), command="optimise"),
         FileKind("contact", "vanedamp.coupling.strength.contact_numbers:ContactFile", ("pair",)),
         FileKind("case", "vanedamp.studies.case.tables:Case", ("mesh", "material", "support"), command="modal"),
         FileKind(

@@ -15,7 +15,7 @@ from vanedamp.files.toml_input import validate
 from vanedamp.studies.identification.data import Measured, decay, forced
 from vanedamp.studies.identification.decay import interpolated
 from vanedamp.studies.identification.study import IdentificationStudy
-from vanedamp.studies.identification.tables import Number, SearchTable
+from vanedamp.studies.identification.tables import SearchTable, Sought
 
 FORCE, FREQUENCY = "excitation.force", "excitation.frequency"
 #: relative standard deviation of all amplitudes
@@ -32,13 +32,13 @@ SCENE: dict[str, Any] = {
 BLOCK = {"shape": "block", "length": 0.01, "height": 0.06}
 PLAY = 5e-5
 NUMBERS = {
-    "damper.0.friction": Number(0.05, 0.9, 0.45),
-    "damper.0.restitution": Number(0.2, 0.95, 0.8),
-    "cavity.c1.gap": Number(5e-4, 2e-3, 1.3e-3),
-    "structure.damping_ratio": Number(0.003, 0.03, 0.005, "log"),
+    "damper.0.friction": Sought(0.05, 0.9, 0.45),
+    "damper.0.restitution": Sought(0.2, 0.95, 0.8),
+    "cavity.c1.gap": Sought(5e-4, 2e-3, 1.3e-3),
+    "structure.damping_ratio": Sought(0.003, 0.03, 0.005, scale="log"),
 }
 #: with friction that holds the body at the lowest level, whatever it is
-HELD = NUMBERS | {"damper.0.friction": Number(0.1, 0.8, 0.45)}
+HELD = NUMBERS | {"damper.0.friction": Sought(0.1, 0.8, 0.45)}
 TRUTH = np.array([0.25, 0.6, 1e-3, 0.01])
 #: force (N) and frequencies (Hz), chosen for what they tell: the body slides without impacts, and strikes both walls
 LEVELS = {0.1: (15.45, 15.55, 15.6, 15.65, 15.85, 15.9), 0.5: (15.15, 15.2, 16.05, 16.25)}
@@ -74,7 +74,7 @@ def exact(block: bool, stuck: bool) -> tuple[tuple[float, ...], ...]:
 
 def study(
     seed: int, block: bool = False, stuck: bool = False, search: SearchTable | None = None,
-    numbers: Mapping[str, Number] | None = None,
+    numbers: Mapping[str, Sought] | None = None,
 ) -> IdentificationStudy:  # fmt: skip
     """Return a study of the scene with a slider, with measurements of it, or of a block, whose noise has a seed."""
     rng, rows = np.random.default_rng(seed), exact(block, stuck)

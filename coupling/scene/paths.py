@@ -49,6 +49,11 @@ def with_numbers(scene: Any, data: Any, numbers: Mapping[str, Any]) -> Any:
     return scene
 
 
+def places(data: Any, path: str) -> list[str]:
+    """Return the paths of the values that a path names in plain scene data. Raises InputError for an unknown place."""
+    return [".".join(map(str, place)) for place in _places(data, path.split("."), path)]
+
+
 def namesake(data: Any, path: str, others: Iterable[str]) -> str | None:
     """Return which of some paths names a value that `path` names as well, or one within it; None: none of them.
 

@@ -205,6 +205,10 @@ COMMANDS = (
                 "the shipped cluster",
             ),
             output_file("SCENE.toml|RING.html"),
+            argument(
+                "--vary", action="append", default=[], metavar="PATH",
+                help="a further number of the scene with a slider, by its dotted path; may be given several times",
+            ),
             argument("--port", type=count, default=0, metavar="N", help="port of 127.0.0.1 (default: a free one)"),
             argument("--no-browser", action="store_true", help="only print the address"),
             workers,

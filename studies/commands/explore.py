@@ -10,7 +10,6 @@ from pathlib import Path
 from vanedamp.files.store import kind_of
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.messages import print_note
-from vanedamp.studies.commands.support.outputs import Outputs
 from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
 from vanedamp.studies.explore.page import Exploration
 from vanedamp.studies.explore.server import has_display, serve
@@ -37,7 +36,9 @@ def run(arguments: Namespace) -> None:
     if sources and not (scenes or sweeps):
         named = ", ".join(map(str, sources))
         raise InputError(f"{named}: holds no sweep; `vanedamp sweep SCENE.toml -o SWEEP.h5` writes one")
-    exploration = None if sweeps else _exploration(scenes[0] if scenes else None, arguments.output, arguments.outputs)
+    exploration = None if sweeps else _exploration(scenes[0] if scenes else None, arguments)
+    if sweeps and arguments.vary:
+        raise InputError("--vary: sliders of sweeps are their axes; leave it out, or name a scene")
     if sweeps and arguments.output:
         raise InputError("--output: a scene is written from the page of a scene; leave it out, or name a scene")
     if exploration is not None and exploration.output is not None and exploration.output.exists():
@@ -57,13 +58,14 @@ def _show_rings(arguments: Namespace) -> None:
         webbrowser.open(address)
 
 
-def _exploration(source: Path | None, output: str | None, outputs: Outputs) -> Exploration:
+def _exploration(source: Path | None, arguments: Namespace) -> Exploration:
     """Return the exploration of a scene's file, or of the shipped rigid model. Raises InputError."""
     if source is None:
         figure = FigureScenes.load(FOLDER / "fig9.toml", Structure.shipped())
         scene, name = figure.scenes[""].replace({"sweep": {}}), "rigid model of the shipped cluster"
     else:
         scene, name = load_scene(source), str(source)
-        outputs.keep(scene.files)
+        arguments.outputs.keep(scene.files)
         check_moved(scene)
-    return Exploration.of(scene, name, None if output is None else Path(output))
+    output = None if arguments.output is None else Path(arguments.output)
+    return Exploration.of(scene, name, output, arguments.vary)

@@ -11,8 +11,11 @@ from typing import Any
 
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rigid
+from vanedamp.coupling.scene.units import label_of, limits_of, unit_of
 from vanedamp.files.toml_input import InputError
 
+#: range of a slider over and below a number whose key has no ends, and ends by the unit of a key
+_AROUND, _ENDS = 20.0, {"degree": (-90.0, 90.0)}
 #: bodies of a cavity, beyond which a curve would take minutes
 MOST_BODIES = 12
 #: keys of a body that may differ between bodies which are equal otherwise
@@ -82,8 +85,8 @@ def moved(scene: Scene, controls: Sequence[Control], texts: Mapping[str, str]) -
     return scene
 
 
-def controls_of(scene: Scene) -> list[Control]:
-    """Return the controls that make sense for a scene, in the order in which they are applied."""
+def controls_of(scene: Scene, wanted: Sequence[str] = ()) -> list[Control]:
+    """Return the controls that make sense for a scene, and of wanted paths, in the order in which they are applied."""
     planar = any(damper.form.planar for damper in scene.damper)
     rigid = isinstance(scene.structure, Rigid)  # a reduced model holds its own damping
     return [
@@ -97,7 +100,32 @@ def controls_of(scene: Scene) -> list[Control]:
         *(_given("structure", scene.structure, _DAMPINGS) if rigid else ()),
         *_given("excitation", scene.excitation, _LEVELS),
         *_orientation(scene),
+        *(control_at(scene, path) for path in dict.fromkeys([*_others(scene), *wanted])),
     ]
+
+
+def control_at(scene: Scene, path: str) -> Control:
+    """Return the control of the number at a path: label, unit and range are those of its key."""
+    (low, high), units = limits_of(path), unit_of(path)
+    factor, unit = (1e-6, "µm") if units == "m" else (1.0, units.removesuffix("1"))
+    ends = (low / factor, high / factor) if math.isfinite(low + high) else _ENDS.get(units)
+    measure = _Measure(path, label_of(path), unit, factor, _AROUND if ends is None else None, *(ends or ()))
+    label = f"{measure.label} ({path})"
+    return _control(measure, path.replace(".", "-"), label, scene.number(path), partial(_changes, path))
+
+
+def _others(scene: Scene) -> Iterator[str]:
+    """Yield the paths of the numbers of tables that have no controls of their own: one for entries that agree."""
+    data = scene.to_dict()
+    for table in dict.fromkeys(("friction_damper", *(name for name, *_ in scene.elements), "contact", "rotation")):
+        given = data.get(table) or []
+        entries = given if isinstance(given, list) else [given]
+        for key in entries[0] if entries else ():
+            values = [entry.get(key) for entry in entries]
+            if not all(isinstance(value, float) for value in values):
+                continue
+            places = [table] if len(set(values)) == 1 else [f"{table}.{index}" for index in range(len(values))]
+            yield from (f"{place}.{key}" for place in places)
 
 
 @dataclass(frozen=True)

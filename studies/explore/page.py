@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +23,7 @@ from vanedamp.studies.explore.chart import key_figures, remarks, response_figure
 from vanedamp.studies.explore.controls import Control, controls_of, moved, number_in
 from vanedamp.studies.explore.curves import EVALUATED, Band, Curve, Curves, Submit, ends_of, explorable, seen
 from vanedamp.studies.file_kinds import KINDS
+from vanedamp.studies.numbers import check_number
 from vanedamp.studies.report.charts import GRAPH
 from vanedamp.studies.report.forced_response import forced_responses
 
@@ -43,12 +44,17 @@ class Exploration:
     output: Path | None = None
 
     @classmethod
-    def of(cls, scene: Scene, source: str, output: Path | None = None) -> Exploration:
-        """Return the exploration of a scene. Raises InputError where no curve can be drawn."""
+    def of(cls, scene: Scene, source: str, output: Path | None = None, wanted: Sequence[str] = ()) -> Exploration:
+        """Return the exploration of a scene, also of the numbers at wanted paths.
+
+        Raises InputError where no curve can be drawn, and for a path that is no number of the scene.
+        """
         plain = explorable(scene)
+        for path in wanted:
+            check_number(plain, path, (), "--vary")
         low, high = ("" if end is None else f"{end:.12g}" for end in ends_of(scene))
         exploration = cls(
-            plain, source, controls_of(plain), {"low": low, "high": high, "evaluated": str(EVALUATED)}, output
+            plain, source, controls_of(plain, wanted), {"low": low, "high": high, "evaluated": str(EVALUATED)}, output
         )
         exploration.seen(exploration.texts)
         return exploration

@@ -19,14 +19,13 @@ from vanedamp.coupling.transients.ring_down_start import table_of
 from vanedamp.files.toml_input import InputError, plain, read_toml, tables, validate
 from vanedamp.studies.identification.data import Measured, read_decay, read_forced, read_impacts
 from vanedamp.studies.identification.sine_sweep import read_sine_sweep
-from vanedamp.studies.identification.tables import IdentificationFile, Number, SearchTable
+from vanedamp.studies.identification.tables import IdentificationFile, SearchTable, Sought
 from vanedamp.studies.measure import Measure
+from vanedamp.studies.numbers import Box, check_number
 from vanedamp.studies.scene_checks import check_moved, load_scene
 
 #: levels over the measured ones, and frequencies over their range, of which the next measurement is chosen by default
 _LEVELS, _FREQUENCIES = (0.5, 1.0, 2.0), 13
-#: tables whose numbers do not describe the scene
-_NO_NUMBERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ class IdentificationStudy:
     """
 
     scene: Scene
-    numbers: Mapping[str, Number]
+    numbers: Mapping[str, Sought]
     measured: Sequence[Measured]
     search: SearchTable = field(default_factory=SearchTable)
     propose: Mapping[str, Sequence[float]] = field(default_factory=dict)
@@ -67,16 +66,9 @@ class IdentificationStudy:
         if count <= known:
             raise InputError(f"numbers: {known} of them need more than {known} measured values, not {count}")
 
-    def _check_number(self, path: str, number: Number) -> None:
+    def _check_number(self, path: str, number: Sought) -> None:
         """Raise InputError for a path that is no number that can be sought, and for bounds that make no scene."""
-        if path.split(".")[0] in _NO_NUMBERS or path == FREQUENCY:
-            raise InputError(f"numbers: {path} is no number of structure, bodies or level; take one such as cavity.gap")
-        try:
-            given = self.scene.number(path)
-            for value in (number.min, number.max):
-                assemble(self.base.replace({path: value}))
-        except InputError as error:
-            raise InputError(f"numbers: {path}: {str(error).removeprefix('scene: ')}") from None
+        given = check_number(self.base, path, (number.min, number.max), "numbers")
         if number.start is None and not number.min <= given <= number.max:
             raise InputError(
                 f"numbers: {path}: the scene's {given:g} lies outside {number.min:g} to {number.max:g}; give start"
@@ -137,20 +129,13 @@ class IdentificationStudy:
         return np.array(starts, float)
 
     @cached_property
-    def _ends(self) -> np.ndarray:
-        """Bounds (2, P), of a log scale as logarithms."""
-        ends = np.array([(number.min, number.max) for number in self.numbers.values()]).T
-        return np.where(self._log, np.log(np.where(self._log, ends, 1.0)), ends)
-
-    @cached_property
-    def _log(self) -> np.ndarray:
-        return np.array([number.scale == "log" for number in self.numbers.values()])
+    def box(self) -> Box:
+        """The numbers between their bounds."""
+        return Box(self.numbers.values())
 
     def values(self, z: np.ndarray) -> np.ndarray:
         """Return values of the numbers (P,) at coordinates (P,) from 0 to 1 between their bounds."""
-        low, high = self._ends
-        spread = low + np.asarray(z) * (high - low)
-        return np.where(self._log, np.exp(np.where(self._log, spread, 0.0)), spread)
+        return self.box.values(z)
 
     def along(self, place: int, z: np.ndarray) -> np.ndarray:
         """Return values (q,) of one number at coordinates (q,) from 0 to 1."""
@@ -158,14 +143,11 @@ class IdentificationStudy:
 
     def coordinates(self, values: np.ndarray) -> np.ndarray:
         """Return coordinates (P,), from 0 to 1, of values of the numbers (P,)."""
-        low, high = self._ends
-        spread = np.where(self._log, np.log(np.where(self._log, values, 1.0)), values)
-        return np.asarray((spread - low) / (high - low))
+        return self.box.places(values)
 
     def slope(self, values: np.ndarray) -> np.ndarray:
         """Return the derivatives (P,) of values by their coordinates."""
-        low, high = self._ends
-        return (high - low) * np.where(self._log, values, 1.0)
+        return self.box.slope(values)
 
     def scene_at(self, values: np.ndarray) -> Scene:
         """Return the scene with values (P,) of the numbers."""

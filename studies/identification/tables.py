@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.coupling.scene.paths import Range
 from vanedamp.files.toml_input import STRICT, Positive, Real, Whole
+from vanedamp.studies.numbers import INLINE, Number
 
-_INLINE = STRICT | ConfigDict(json_schema_extra={"x-inline": True})
 
-
-@dataclass(frozen=True, config=_INLINE)
+@dataclass(frozen=True, config=INLINE)
 class Prior:
     """What is known of a number beforehand: a normal distribution."""
 
@@ -24,17 +23,11 @@ class Prior:
 
 
 @dataclass(frozen=True, config=STRICT)
-class Number:
+class Sought(Number):
     """A number of the scene that is sought, between bounds."""
 
-    min: Real
-    """smallest value that it may have [unit of the number]"""
-    max: Real
-    """largest value that it may have [unit of the number]"""
     start: Real | None = None
     """value that is tried first (default: the scene's) [unit of the number]"""
-    scale: Literal["linear", "log"] = "linear"
-    """how values between the bounds are spread: "log" for a number that is known to some powers of ten"""
     prior: Prior | None = None
     """what is known of it beforehand (default: nothing but the bounds)"""
 
@@ -43,8 +36,7 @@ class Number:
             raise ValueError(f"max: expected more than min = {self.min:g}, not {self.max:g}")
         if self.start is not None and not self.min <= self.start <= self.max:
             raise ValueError(f"start: expected {self.min:g} to {self.max:g}, not {self.start:g}")
-        if self.scale == "log" and self.min <= 0.0:
-            raise ValueError(f'min: expected a positive number with scale = "log", not {self.min:g}')
+        super().__post_init__()
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -136,7 +128,7 @@ class IdentificationFile:
 
     scene: str
     """scene file, relative to this one"""
-    numbers: Annotated[dict[str, Number], Field(min_length=1)]
+    numbers: Annotated[dict[str, Sought], Field(min_length=1)]
     """the numbers that are sought, by their dotted paths as axes of a sweep have them"""
     forced: tuple[ForcedTable, ...] = ()
     """forced responses, one table each"""

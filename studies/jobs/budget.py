@@ -92,8 +92,7 @@ def _modes(scene: Scene) -> int:
 
 def designs_of(study: Study) -> int:
     """Return about how many designs an optimisation runs: of its map, and of both searches."""
-    table = study.table
-    return table.map.mass_ratio * table.map.gap_ratio + 2 * table.evaluations
+    return study.mapped + 2 * study.table.evaluations
 
 
 def scenes_of(study: Study) -> int:

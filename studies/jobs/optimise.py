@@ -12,7 +12,8 @@ from vanedamp.studies.jobs.budget import check_optimise
 from vanedamp.studies.jobs.job import JobResult, Means, StudyJob
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import optimise
-from vanedamp.studies.optimisation.study import Study, StudyFile
+from vanedamp.studies.optimisation.study import Study
+from vanedamp.studies.optimisation.tables import StudyFile
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,7 @@ class OptimiseJob(StudyJob):
 
     def compiled(self) -> Iterable[Scene]:
         """Return the scene with every number of bodies."""
-        low, high = self.study.table.variables.bodies
-        return map(self.study.with_bodies, range(low, high + 1))
+        return map(self.study.with_bodies, self.study.counts)
 
     def work(self, means: Means) -> JobResult:
         """Search."""

@@ -1,9 +1,10 @@
-"""The best design as designed, continued by gradient: mass and gap along derivatives of responses that repeat.
+"""The best design as designed, continued by gradient: its numbers along derivatives of responses that repeat.
 
 The lowest worst amplitude t is the solution of an epigraph problem: t is minimal, and no amplitude of the band exceeds
 it. Amplitudes and derivatives are those of periodic orbits, followed from design to design; sequential quadratic
 programming (Kraft 1988) solves the problem within a reach of the last design, and the result is taken if runs of the
-whole band confirm it. Where a response does not repeat its amplitude stays as the run has it.
+whole band confirm it. Where a response does not repeat its amplitude stays as the run has it; a number by which one has
+no derivative stays as it is.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ import numpy as np
 from scipy.optimize import minimize
 
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.studies.numbers import Box
 from vanedamp.studies.optimisation.slopes import Slope, steady_slope
-from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
+from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.tables import NO_DEVIATION
 
 #: amplitudes at least this fraction of the worst may become the worst within a step
 _NEAR = 0.7
@@ -29,8 +32,6 @@ _GAIN = 1e-5
 _STARTS, _APART = 4, 0.1
 #: iterations within a step, and their tolerance
 _ITERATIONS, _TOLERANCE = 15, 1e-9
-_PATHS = {"mass_ratio": "mass", "gap_ratio": "gap"}
-
 
 #: gives the amplitude of a design as it is, and those at the frequencies (f,), nan where a run is not ok
 Tried = Callable[[Design], tuple[float, np.ndarray]]
@@ -44,7 +45,7 @@ def descend(study: Study, tried: Tried, designs: Sequence[Design]) -> tuple[Desi
     tried; taken: of these; orbits: found on the way, with their derivatives; without: number of responses that counted
     and had no derivatives, by the reason.
     """
-    names = [name for name in _PATHS if len(set(getattr(study.table.variables, name))) > 1]
+    names = [name for name, number in study.variables.items() if name != "bodies" and number.min < number.max]
     how: dict[str, Any] = {"before": None, "after": None, "steps": 0, "taken": 0, "orbits": 0, "without": {}}
     follows = names and study.table.gradient_steps and study.table.by_amplitude
     for start in _starts(study, names, designs) if follows else ():
@@ -64,12 +65,13 @@ def descend(study: Study, tried: Tried, designs: Sequence[Design]) -> tuple[Desi
 
 def _starts(study: Study, names: Sequence[str], designs: Sequence[Design]) -> list[Design]:
     """Return the first of some designs that are not close to each other."""
-    ranges, chosen = {name: np.ptp(getattr(study.table.variables, name)) for name in names}, list[Design]()
+    box, chosen = Box(study.variables[name] for name in names), list[Design]()
+
+    def place(design: Design) -> np.ndarray:
+        return box.places(np.array([design.values[name] for name in names]))
+
     for design in designs:
-        apart = (
-            max(abs(getattr(design, name) - getattr(other, name)) / ranges[name] for name in names)
-            for other in chosen if other.bodies == design.bodies
-        )  # fmt: skip
+        apart = (float(np.abs(place(design) - place(other)).max()) for other in chosen if other.bodies == design.bodies)
         if len(chosen) < _STARTS and min(apart, default=np.inf) >= _APART:
             chosen.append(design)
     return chosen
@@ -107,18 +109,20 @@ class _Surface:
 
     def __init__(self, study: Study, names: Sequence[str], start: Design, response: np.ndarray) -> None:
         self._study, self._names, self._start = study, names, start
-        self._paths = [study.paths[_PATHS[name]] for name in names]
-        low, high = np.reshape([getattr(study.table.variables, name) for name in names], (-1, 2)).T
-        units = {"mass_ratio": study.mass / start.bodies, "gap_ratio": study.amplitude}
-        self._low, self._range = low, high - low
-        self._units = self._range * [units[name] for name in names]
+        self._box, numbers = Box(study.variables[name] for name in names), study.numbers(start)
+        self._paths = [numbers[name][0] for name in names]
+        self._own_units = np.array([numbers[name][2] for name in names])
         self.orbits, self._passed = 0, list[tuple[np.ndarray, dict[int, Slope]]]()
-        self.settle((np.array([getattr(start, name) for name in names]) - low) / self._range, response)
+        self.settle(self._box.places(np.array([start.values[name] for name in names])), response)
 
     def design(self, place: np.ndarray) -> Design:
         """Return the design at a place."""
-        values = self._low + self._range * place
-        return self._start._replace(**dict(zip(self._names, values.tolist(), strict=True)))
+        values = self._box.values(place).tolist()
+        return Design.of(self._start.values | dict(zip(self._names, values, strict=True)))
+
+    def _units(self, place: np.ndarray) -> np.ndarray:
+        """Return the derivatives (v,) of the scene's numbers by the place."""
+        return self._box.slope(self._box.values(place)) * self._own_units
 
     def settle(self, place: np.ndarray, response: np.ndarray) -> None:
         """Go to a place, whose amplitudes are (f,)."""
@@ -139,7 +143,7 @@ class _Surface:
             if ahead is not None and ahead.agrees(amplitude):
                 self._slopes[f] = ahead
                 continue
-            found = steady_slope(self._scene(self.place, f), self._paths, self._study.table.measure, amplitude)
+            found = steady_slope(self._scene(self.place, f), self._paths, self._study.table.measure, amplitude, True)
             if isinstance(found, Slope):
                 self._slopes[f], self.orbits = found, self.orbits + 1
             else:
@@ -168,7 +172,10 @@ class _Surface:
 
     def lowest(self, reach: float) -> np.ndarray:
         """Return the place (v,) within reach where orbits are lowest: at worst, or in the mean of the band."""
-        low, high = np.maximum(self.place - reach, 0.0), np.minimum(self.place + reach, 1.0)
+        held = np.isnan([slope.by_number for slope in self._slopes.values()]).any(axis=0)
+        low, high = (np.where(held, self.place, end) for end in (
+            np.maximum(self.place - reach, 0.0), np.minimum(self.place + reach, 1.0),
+        ))  # fmt: skip
         bounds, options = list(zip(low, high, strict=True)), {"maxiter": _ITERATIONS, "ftol": _TOLERANCE}
         if not self._worst:
             mean = lambda place: tuple(part.mean(axis=0) for part in self._at(place))  # noqa: E731
@@ -195,7 +202,8 @@ class _Surface:
         values, turns = self._response.copy(), np.zeros((len(self._response), len(place)))
         for f, here in self._slopes.items():
             there = slopes.get(f)
-            by_place = (there or here).by_number * self._units
+            at = self.place if there is None else place
+            by_place = np.nan_to_num((there or here).by_number) * self._units(at)
             moved = by_place @ (place - self.place) if there is None else there.amplitude - here.amplitude
             values[f] += moved / self._study.reference
             turns[f] = by_place / self._study.reference
@@ -209,7 +217,7 @@ class _Surface:
                 ((at, slopes[f]) for at, slopes in self._passed if f in slopes),
                 key=lambda known: float(np.abs(known[0] - place).max()),
             )
-            change = self._units * (place - at)
+            change = self._units(at) * (place - at)
             moved = slope.near(self._scene(place, f), self._paths, self._study.table.measure, change)
             if moved is not None:
                 found[f], self.orbits = moved, self.orbits + 1

@@ -8,9 +8,13 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.files.record import Array, Coded, Record
+from vanedamp.coupling.scene.units import limits_of
+from vanedamp.files.record import Array, Coded, Record, empty
+from vanedamp.files.toml_input import validate
 from vanedamp.studies.machining import fine_gap
-from vanedamp.studies.optimisation.study import Design
+from vanedamp.studies.numbers import Box
+from vanedamp.studies.optimisation.design import Design
+from vanedamp.studies.optimisation.tables import Variables
 
 #: distance from a bound, over the range, at which a search has run into it
 _AT_BOUND = 0.01
@@ -55,7 +59,7 @@ class Optimum:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        return self.design._asdict() | {
+        return self.design.to_json() | {
             "amplitude": self.amplitude, "amplitude_tolerances": self.amplitude_tolerances,
             "reduction": self.reduction, "reduction_tolerances": self.reduction_tolerances,
             "estimate": dict(self.estimate),
@@ -64,8 +68,8 @@ class Optimum:
     @classmethod
     def of(cls, data: Mapping[str, Any], _path: str = "") -> Optimum:
         """Return the record of `to_json`."""
-        design = Design(data["mass_ratio"], data["gap_ratio"], int(data["bodies"]))
-        return cls(design, data["amplitude"], data["amplitude_tolerances"], data.get("estimate", {}))
+        design = {name: data[name] for name in ("mass_ratio", "gap_ratio", "bodies")} | data.get("numbers", {})
+        return cls(Design.of(design), data["amplitude"], data["amplitude_tolerances"], data.get("estimate", {}))
 
 
 _Optimum = Annotated[Optimum, Coded(Optimum.to_json, Optimum.of)]
@@ -97,7 +101,7 @@ class Optimisation(Record):
     map_gap_ratio: Annotated[np.ndarray, Array(("map_gap_ratio",))]
     """gap over X"""
     map_amplitude: Annotated[np.ndarray, Array(("map_mass_ratio", "map_gap_ratio"))]
-    """of designs without deviations, with the bodies of `nominal`"""
+    """of designs as they are, everything else as in `nominal`; empty where the study leaves mass or gap to the scene"""
     history_design: Annotated[np.ndarray, Array(("evaluation", "variable"))]
     """designs in the order in which they were tried"""
     history_amplitude: _Tried
@@ -124,11 +128,25 @@ class Optimisation(Record):
     """worst of these designs over starts (worst_start.worst_start), by the same names"""
     gradient: Mapping[str, Any] = field(default_factory=dict)
     """refinement of the best design by derivatives (gradient.descend)"""
+    along_value: Annotated[np.ndarray, Array(("number", "point"))] = field(default_factory=empty)
+    """values of each variable without an axis of the map; its name is in `number`"""
+    along_amplitude: Annotated[np.ndarray, Array(("number", "point"))] = field(default_factory=empty)
+    """of designs as they are, everything else as in `nominal`"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def labels(self) -> dict[str, Any]:
-        """Return the names of a design's variables."""
-        return {"variable": Design._fields}
+        """Return the names of a design's variables, and of those without an axis of the map."""
+        return {"variable": tuple(self.nominal.design.values)} | ({"number": self.along} if self.along else {})
+
+    @property
+    def choice(self) -> Variables:
+        """What could be chosen."""
+        return validate(Variables, self.study["optimise"]["variables"], "optimise.variables")
+
+    @property
+    def along(self) -> tuple[str, ...]:
+        """Names of the variables without an axis of the map, n of them."""
+        return tuple(self.choice.along)
 
     def derived(self) -> dict[str, Any]:
         """Return the remarks."""
@@ -158,17 +176,19 @@ class Optimisation(Record):
     def _doubts(self, design: Design) -> Iterator[str]:
         """Yield that a design lies at a bound of its range, or has a gap that no machine cuts, in words."""
         table = self.study["optimise"]
-        for name, value in design._asdict().items():
-            low, high = table["variables"][name]
-            near = _AT_BOUND * (high - low)
-            at_low = value - low <= near and (name, low) != ("bodies", 1)  # no design has fewer
-            if low < high and (at_low or high - value <= near):
+        for name, number in self.choice.all.items():
+            value, low, high = design.values[name], number.min, number.max
+            least, most = (1, np.inf) if name == "bodies" else limits_of(name)  # there are none beyond
+            place = float(Box([number]).places(np.array([value]))[0]) if low < high else 0.5
+            at_low = place <= _AT_BOUND and low > least
+            if at_low or (1.0 - place <= _AT_BOUND and high < most):
                 yield (
                     f"{name} = {value:.4g} is at the {'lower' if at_low else 'upper'} bound of its range, {low:g} to "
                     f"{high:g}: better designs may lie beyond it"
                 )
-        gap = design.gap_ratio * self.amplitude
-        yield fine_gap(gap, table["tolerances"]["gap"] * gap or None)
+        gaps = [value for path, value in design.numbers if path.endswith(".gap")]
+        for gap in gaps if design.gap_ratio is None else [design.gap_ratio * self.amplitude]:
+            yield fine_gap(gap, table["tolerances"]["gap"] * gap or None)
 
     @property
     def optima(self) -> dict[str, Optimum]:

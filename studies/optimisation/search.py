@@ -1,4 +1,4 @@
-"""The damper that reduces most: mass, gap and number of bodies, as designed and within tolerances.
+"""The damper that reduces most: mass, gap, number and other numbers of bodies, as designed and within tolerances.
 
 Both searches are scipy's differential evolution (Storn and Price, 1997), which evaluates a whole generation at a time,
 on all workers. The second starts from the best designs of the first, and judges each by the same sample of the
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +18,18 @@ import numpy as np
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
+from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.store import finite
 from vanedamp.files.toml_input import tables
+from vanedamp.studies.band import drive
 from vanedamp.studies.headline import Headline, headline
+from vanedamp.studies.numbers import Box
 from vanedamp.studies.optimisation.checkpoint import Checkpoint
 from vanedamp.studies.optimisation.gradient import descend
 from vanedamp.studies.optimisation.measures import SERVICE
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
-from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
+from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.tables import NO_DEVIATION
 from vanedamp.studies.optimisation.tolerances import estimate
 from vanedamp.studies.terminal import stage
 from vanedamp.studies.worst_start import STARTS, worst_start, worst_words
@@ -65,11 +69,14 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         robust = nominal  # the search as designed has found the better one
     if robust.amplitude < nominal.amplitude:
         nominal = robust
-    masses = np.linspace(*table.variables.mass_ratio, table.map.mass_ratio)
-    gaps = np.linspace(*table.variables.gap_ratio, table.map.gap_ratio)
-    designs = [Design(float(mass), float(gap), nominal.design.bodies) for mass in masses for gap in gaps]
+    masses, gaps = study.map_axes
+    best = nominal.design.values
+    along = {name: study.places(name) for name in study.table.variables.along}
+    changed = [{"mass_ratio": mass, "gap_ratio": gap} for mass in masses.tolist() for gap in gaps.tolist()]
+    changed += [{name: value} for name, values in along.items() for value in values.tolist()]
     with stage("map"):
-        amplitudes = trial.judge(designs, robust=False).reshape(len(masses), len(gaps))
+        amplitudes = trial.judge([study.design(best | each) for each in changed], robust=False)
+    split = len(masses) * len(gaps)
     tried_designs, tried_amplitudes, tried_robust = zip(*trial.history, strict=True)
     best = {"nominal": nominal.design, "robust": robust.design}
     responses = {name: trial.response(design) for name, design in best.items()}
@@ -91,8 +98,8 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         robust=replace(robust, estimate=estimates["robust"]),
         map_mass_ratio=masses,
         map_gap_ratio=gaps,
-        map_amplitude=amplitudes,
-        history_design=np.array(tried_designs),
+        map_amplitude=amplitudes[:split].reshape(len(masses), len(gaps)),
+        history_design=np.array([list(design.values.values()) for design in tried_designs], float),
         history_amplitude=np.array(tried_amplitudes),
         history_robust=np.array(tried_robust),
         frequency=study.frequencies,
@@ -102,6 +109,8 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
         headlines={name: _of_band(headline) for name, headline in headlines.items()},
         starts=starts,
         gradient=gradient,
+        along_value=np.array(list(along.values())),
+        along_amplitude=amplitudes[split:].reshape(len(along), -1) if along else amplitudes[split:],
         scenes=trial.scenes,
         trouble=trial.trouble,
         sentence=_sentence(study, nominal, robust, headlines, starts),
@@ -111,7 +120,7 @@ def _optimised(study: Study, trial: _Trial, provenance: dict[str, Any]) -> Optim
 
 def deviations(study: Study) -> list[_Deviation]:
     """Return the sample of the tolerances: the design itself, and a Latin hypercube over those that are not zero."""
-    widths = {name: width for name, width in asdict(study.table.tolerances).items() if width > 0}
+    widths = {name: width.half for name, width in study.widths.items()}
     if not widths:
         return [NO_DEVIATION]
     points = qmc.LatinHypercube(len(widths), seed=study.table.seed).random(study.table.samples)
@@ -138,12 +147,12 @@ class _Trial:
         self.scenes = self.trouble = self._others = 0
         self._executor, self._progress, self._kept = executor, progress, kept
         table = study.table
-        self._variables = [n for n in Design._fields if len(set(getattr(table.variables, n))) > 1]
+        self._variables = {name: number for name, number in study.variables.items() if number.min < number.max}
         both = 2 if len(sample) > 1 else 1
         searched = table.evaluations, (both - 1) * table.evaluations * len(sample)
         self._designs = (
             searched[0] + table.gradient_steps * table.by_amplitude, searched[1],
-            table.map.mass_ratio * table.map.gap_ratio + both * len(sample), both * len(STARTS) * table.by_amplitude,
+            study.mapped + both * len(sample), both * len(STARTS) * table.by_amplitude,
         )  # fmt: skip
         self.begins(0)
 
@@ -191,23 +200,24 @@ class _Trial:
 
         robust: within the tolerances, or as designed.
         """
-        table, names = self.study.table, self._variables
+        table, names, box = self.study.table, list(self._variables), Box(self._variables.values())
         if not names:
             return self._design([])
-        bounds = [getattr(table.variables, name) for name in names]
+        bounds = box.ends.T.tolist()
         size = max(5, table.evaluations // max(_GENERATIONS, math.isqrt(table.evaluations)))
-        first = np.array([[getattr(design, name) for name in names] for design in designs[:size]], float)
+        first = np.array([[design.values[name] for name in names] for design in designs[:size]], float)
+        first = box.spread(first) if designs else first
         if not designs:
             first = qmc.scale(qmc.LatinHypercube(len(names), seed=table.seed).random(size), *np.transpose(bounds))
 
         def objective(columns: np.ndarray) -> np.ndarray:
-            return self._tried([self._design(column) for column in np.atleast_2d(columns.T)], robust)
+            return self._tried([self._design(box.gathered(column)) for column in np.atleast_2d(columns.T)], robust)
 
         minimum = differential_evolution(
             objective, bounds, init=first, maxiter=max(table.evaluations // size - 1, 1), tol=0.0, polish=False,
             seed=table.seed, updating="deferred", vectorized=True, integrality=[name == "bodies" for name in names],
         )  # fmt: skip
-        return self._design(minimum.x)
+        return self._design(box.gathered(minimum.x))
 
     def best_designs(self, best: Design) -> list[Design]:
         """Return the designs so far, that one first, then the others from the best to the worst."""
@@ -222,9 +232,8 @@ class _Trial:
 
     def _design(self, values: Sequence[float] | np.ndarray) -> Design:
         """Return the design of the variables' values; the others are held."""
-        held = {name: getattr(self.study.table.variables, name)[0] for name in Design._fields}
-        chosen = held | dict(zip(self._variables, map(float, values), strict=True))
-        return Design(chosen["mass_ratio"], chosen["gap_ratio"], round(chosen["bodies"]))
+        held = {name: number.min for name, number in self.study.variables.items()}
+        return self.study.design(held | dict(zip(self._variables, map(float, values), strict=True)))
 
     def judge(self, designs: Sequence[Design], robust: bool) -> np.ndarray:
         """Return the amplitudes (d,) of designs within the tolerances, or as they are."""
@@ -255,14 +264,13 @@ class _Trial:
         """  # fmt: skip
         shape = (len(designs), len(sample), len(self.study.frequencies))
         damped, undamped, excess = np.zeros((3, *shape))
-        more = [deviation["excitation"] if self.study.table.linear else 0.0 for deviation in sample]
+        more = [self.study.level_deviation(deviation) if self.study.table.linear else 0.0 for deviation in sample]
         levels = self.study.reference * (1 + np.array(more))[:, None]
         for count in sorted({design.bodies for design in designs}):
             places = [place for place, design in enumerate(designs) if design.bodies == count]
-            points = [
-                self.study.point(designs[place], deviation, float(frequency))
-                for place in places for deviation in sample for frequency in self.study.frequencies
-            ]  # fmt: skip
+            changes = self.study.changes(designs[places[0]])
+            moved = [self.study.moved(changes, designs[place], deviation) for place in places for deviation in sample]
+            points = [drive(self.study.scene, float(f)) | each for each in moved for f in self.study.frequencies]
             run = self._kept.run(self.study.with_bodies(count), points, self._executor, self._tell)
             self.scenes += len(points)
             ok = run[:, 3] == 1.0
@@ -308,7 +316,7 @@ def _sentence(
     left = f"{1 - nominal.reduction:.0%} left"
     text = f"{_format_design(nominal.design, study)} gains {nominal.reduction:.0%} of {of} ({left}); "
     text += worst_words(starts["nominal"])
-    if asdict(table.tolerances) != NO_DEVIATION:
+    if study.widths:
         kind = "at worst" if table.over_tolerances == "worst" else "in the mean"
         text += (
             f"; it gains {nominal.reduction_tolerances:.0%} {kind} within the tolerances; robust: "
@@ -328,7 +336,7 @@ def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum) -> str:
         "wear": f"of X worn off in {SERVICE:g} h",
     }.get(table.measure, f"of the limit of {table.measure}")
     text = f"{_format_design(nominal.design, study)}: {nominal.amplitude:.3g} {of}, {table.over_band} of the band"
-    if asdict(table.tolerances) != NO_DEVIATION:
+    if study.widths:
         text += (
             f"; {nominal.amplitude_tolerances:.3g} within the tolerances; robust: "
             f"{_format_design(robust.design, study)}: {robust.amplitude:.3g}, {robust.amplitude_tolerances:.3g} within"
@@ -337,8 +345,10 @@ def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum) -> str:
 
 
 def _format_design(design: Design, study: Study) -> str:
-    bodies = "1 body" if design.bodies == 1 else f"{design.bodies} bodies"
-    return (
-        f"{bodies} of together {design.mass_ratio:.2%} of the mass ({1e3 * design.mass_ratio * study.mass:.3g} g) with "
-        f"a gap of {design.gap_ratio:.2f} X ({1e6 * design.gap_ratio * study.amplitude:.3g} µm)"
-    )
+    text = "1 body" if design.bodies == 1 else f"{design.bodies or 'no'} bodies"
+    if design.mass_ratio is not None:
+        text += f" of together {design.mass_ratio:.2%} of the mass ({1e3 * design.mass_ratio * study.mass:.3g} g)"
+    named = [f"{path} = {value:.4g} {unit_of(path)}".removesuffix(" 1") for path, value in design.numbers]
+    if design.gap_ratio is not None:
+        named = [f"a gap of {design.gap_ratio:.2f} X ({1e6 * design.gap_ratio * study.amplitude:.3g} µm)", *named]
+    return f"{text} with {', '.join(named)}" if named else text

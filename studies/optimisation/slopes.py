@@ -37,23 +37,27 @@ class Slope(NamedTuple):
         return abs(self.amplitude - amplitude) <= _SAME * amplitude
 
     def near(self, scene: Scene, paths: Sequence[str], measure: str, change: np.ndarray) -> Slope | None:
-        """Return the slope in a scene whose numbers differ by (P,) from this one's; None if the orbit is lost."""
+        """Return the slope in a scene whose numbers differ by (P,) from this one's; None if the orbit is lost.
+
+        As of `steady_slope` with `some`.
+        """
         given = self.orbit.map
         assert given is not None
         table = OrbitTable(parameter=given.parameter, periods=given.periods)
-        start = given.restart_of(self.orbit.state + self.moves @ change)
+        start = given.restart_of(self.orbit.state + np.nan_to_num(self.moves) @ change)
         try:
-            found = slope_of(find_orbit(replace(scene, orbit=table), start), paths, measure)
+            found = slope_of(find_orbit(replace(scene, orbit=table), start), paths, measure, some=True)
         except InputError:
             return None
         return found if isinstance(found, Slope) else None
 
 
-def steady_slope(scene: Scene, paths: Sequence[str], measure: str, amplitude: float) -> Slope | str:
+def steady_slope(scene: Scene, paths: Sequence[str], measure: str, amplitude: float, some: bool = False) -> Slope | str:
     """Return the slope of the motion on which a scene settles, or why there is none.
 
-    measure: name of an amplitude; amplitude: of the scene's run, m, nan for a run that is not ok. Amplitudes about a
-    static deflection have none, nor have scenes of another method, or that orbits refuse.
+    measure: name of an amplitude; amplitude: of the scene's run, m, nan for a run that is not ok; some: whether
+    derivatives by some of the numbers do, the others being nan. Amplitudes about a static deflection have none, nor
+    have scenes of another method, or that orbits refuse.
     """
     if not np.isfinite(amplitude):
         return _NOT_OK
@@ -63,15 +67,19 @@ def steady_slope(scene: Scene, paths: Sequence[str], measure: str, amplitude: fl
         return _DEFLECTS
     try:
         orbit = settled_orbit(scene)
-        found = _NOT_PERIODIC if orbit is None else slope_of(orbit, paths, measure)
+        found = _NOT_PERIODIC if orbit is None else slope_of(orbit, paths, measure, some)
     except InputError:
         return _REFUSED
     return _NOT_PERIODIC if isinstance(found, Slope) and not found.agrees(amplitude) else found
 
 
-def slope_of(orbit: Orbit, paths: Sequence[str], measure: str) -> Slope | str:
+def slope_of(orbit: Orbit, paths: Sequence[str], measure: str, some: bool) -> Slope | str:
     """Return the slope of an orbit, or the status of its derivatives."""
     found = sensitivity(orbit, paths)
-    if not found.complete:
-        return (SensitivityStatus.UNDETERMINED if found.status is SensitivityStatus.OK else found.status).value
-    return Slope(found.values[measure], found.derivatives[measure], orbit, found.state_derivative)
+    if found.status is not SensitivityStatus.OK:
+        return found.status.value
+    known = np.isfinite(found.derivatives[measure]) & np.isfinite(found.state_derivative).all(axis=0)
+    if not (known.any() if some else known.all()):
+        return SensitivityStatus.UNDETERMINED.value
+    by_number = np.where(known, found.derivatives[measure], np.nan)
+    return Slope(found.values[measure], by_number, orbit, found.state_derivative)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from vanedamp.studies.optimisation.slopes import Slope, steady_slope
-from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
+from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.tables import NO_DEVIATION
 
 _Deviation = Mapping[str, float]
 #: amplitudes at least this fraction of the worst may become the worst within the tolerances
@@ -32,17 +33,17 @@ def estimate(
     none, its frequency and reason only. Empty without tolerances, and where
     no amplitude counts.
     """
-    widths = {name: width for name in NO_DEVIATION if (width := getattr(study.table.tolerances, name)) > 0.0}
+    widths = {name: width.half for name, width in study.widths.items()}
     if not widths or not study.table.by_amplitude:
         return {}
-    whole = study.table.over_band == "mean"
-    slopes, without = np.zeros((len(response), len(widths))), Counter[str]()
+    changes, whole = study.changes(design), study.table.over_band == "mean"
+    paths = list(dict.fromkeys(path for name in widths for path in changes.of[name]))
+    slopes, without = np.zeros((len(response), len(paths))), Counter[str]()
     nothing: dict[str, Any] = dict.fromkeys(("worst", "run", "mean")) | {"by": []}
     for f in np.argsort(-response, kind="stable").tolist():
         frequency = float(study.frequencies[f])
         scene = study.scene_of(design, NO_DEVIATION, frequency)
-        paths, amplitude = [study.paths[name] for name in widths], study.reference * float(response[f])
-        found = steady_slope(scene, paths, study.table.measure, amplitude)
+        found = steady_slope(scene, paths, study.table.measure, study.reference * float(response[f]))
         if isinstance(found, Slope):
             slopes[f] = found.by_number
             continue
@@ -54,9 +55,9 @@ def estimate(
 
     def moved(deviation: _Deviation) -> np.ndarray:
         """Return the change (f,) by a deviation."""
-        ends = [study.point(design, each, float(study.frequencies[0])) for each in (NO_DEVIATION, deviation)]
-        change = np.array([ends[1][study.paths[name]] - ends[0][study.paths[name]] for name in widths])
-        return slopes @ change / study.reference - deviation["excitation"] * response
+        ends = [study.moved(changes, design, each) for each in (NO_DEVIATION, deviation)]
+        change = np.array([ends[1][path] - ends[0][path] for path in paths])
+        return slopes @ change / study.reference - study.level_deviation(deviation) * response
 
     ends = np.array(
         [[moved({**NO_DEVIATION, name: side * width}) for side in (1.0, -1.0)] for name, width in widths.items()]

@@ -17,7 +17,8 @@ def facts(record: Found) -> Iterator[Fact]:
     """Yield its figures."""
     attributes = record.attributes
     yield Fact("answer", attributes["sentence"])
-    yield Fact("nominal", attributes["nominal"], "", "best as designed")
-    yield Fact("robust", attributes["robust"], "", "best within the tolerances")
+    for name, told in (("nominal", "best as designed"), ("robust", "best within the tolerances")):
+        design = {key: value for key, value in attributes[name].items() if value is not None}
+        yield Fact(name, design, "", told)
     yield Fact("remarks", Optimisation.load(record.path).remarks)
     yield Fact("scenes", attributes["scenes"], "", f"of them {attributes['trouble']} not ok")

@@ -157,6 +157,31 @@ def test_play_is_for_bodies_with_extent():
     assert "play" in {control.name for control in controls_of(scene(cavity=cavity, damper=block))}
 
 
+def test_numbers_of_other_tables_have_the_label_and_range_of_their_keys():
+    damper = {"normal_force": 2.0, "friction": 0.3, "stiffness": 1e6}
+    held = scene(
+        friction_damper=[damper, damper | {"stiffness": 2e6}], stop=[{"side": "right", "gap": 1e-4, "restitution": 0.5}]
+    )
+    controls = {control.name: control for control in controls_of(held, ["cavity.c1.centrifugal_deg", "structure.mass"])}
+    stiffness, bounded = controls["friction_damper-1-stiffness"], controls["stop-restitution"]
+    assert (stiffness.label, stiffness.unit) == (
+        "tangential stiffness in series with the contact (friction_damper.1.stiffness)", "N/m",
+    )  # fmt: skip
+    assert stiffness.log and (stiffness.low, stiffness.high) == (1e5, 4e7)
+    assert (bounded.low, bounded.high, bounded.log) == (0.0, 1.0, False)
+    assert {"friction_damper-friction", "friction_damper-0-stiffness", "structure-mass"} <= set(controls)
+    assert controls["stop-gap"].unit == "µm" and controls["stop-gap"].value == pytest.approx(100.0)
+    assert (controls["cavity-c1-centrifugal_deg"].low, controls["cavity-c1-centrifugal_deg"].high) == (-90.0, 90.0)
+    other = moved(held, list(controls.values()), {"friction_damper-1-stiffness": "3e6", "structure-mass": "1.5"})
+    assert [one.stiffness for one in other.friction_damper] == [1e6, 3e6] and other.structure.mass == 1.5
+
+
+def test_a_slider_of_no_number_is_rejected():
+    for path, told in (("cavity.c1.width", "no 'width' there"), ("time.tolerance", "is no number of structure")):
+        with pytest.raises(InputError, match=f"--vary: .*{told}"):
+            page.Exploration.of(scene(), "scene.toml", wanted=[path])
+
+
 NONSENSE = (
     ("gap", "abc", "gap: expected a number in µm, not 'abc'"),
     ("gap", "", "gap: expected a number in µm, not ''"),

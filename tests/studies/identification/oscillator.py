@@ -10,7 +10,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validate
 from vanedamp.studies.identification.data import decay, forced
 from vanedamp.studies.identification.study import IdentificationStudy
-from vanedamp.studies.identification.tables import Number, SearchTable
+from vanedamp.studies.identification.tables import SearchTable, Sought
 
 MASS, STIFFNESS, RATIO, FORCE, PULL = 1.0, 1e4, 0.01, 0.5, 1e-3
 OMEGA = math.sqrt(STIFFNESS / MASS)
@@ -22,8 +22,8 @@ SCENE = {
     "time": {"periods": 300, "transient": 250},
 }
 NUMBERS = {
-    "structure.damping_ratio": Number(0.002, 0.05, 0.02, "log"),
-    "structure.stiffness": Number(0.9e4, 1.1e4, 1.02e4),
+    "structure.damping_ratio": Sought(0.002, 0.05, 0.02, scale="log"),
+    "structure.stiffness": Sought(0.9e4, 1.1e4, 1.02e4),
 }
 FREQUENCY = np.array([15.3, 15.6, 15.8, 15.9, 16.0, 16.2, 16.6])
 

@@ -11,7 +11,7 @@ from tests.studies.identification.oscillator import FORCE, MASS, OMEGA, RATIO
 from vanedamp.coupling.simulation import simulate
 from vanedamp.studies.identification.data import forced
 from vanedamp.studies.identification.study import IdentificationStudy
-from vanedamp.studies.identification.tables import Number
+from vanedamp.studies.identification.tables import Sought
 
 BODY, GAP, RESTITUTION, NOISE = 0.03, 1e-3, 0.55, 0.02
 AT = (15.38, 15.4, 15.42, 15.44, 15.46, 15.8, 15.85, 15.9)
@@ -75,7 +75,7 @@ def test_measurements_are_those_of_the_scene():
 def test_intervals_cover_the_truth():
     """Of 100 data sets 95 % of the intervals do, with 5 of them missed more or less by chance (2.3 deviations)."""
     exact = np.array([amplitude(frequency) for frequency in AT])
-    numbers = {"cavity.c1.gap": Number(7e-4, 1.4e-3), "damper.0.restitution": Number(0.3, 0.8)}
+    numbers = {"cavity.c1.gap": Sought(7e-4, 1.4e-3), "damper.0.restitution": Sought(0.3, 0.8)}
     rises = []
     for seed in range(100):
         noisy = exact * np.exp(NOISE * np.random.default_rng(seed).standard_normal(len(exact)))

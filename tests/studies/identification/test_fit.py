@@ -14,7 +14,7 @@ from vanedamp.studies.identification.decay import interpolated
 from vanedamp.studies.identification.density import LogDensity
 from vanedamp.studies.identification.fit import Fit, _gain
 from vanedamp.studies.identification.study import IdentificationStudy
-from vanedamp.studies.identification.tables import ForcedTable, ImpactsTable, Number, Prior
+from vanedamp.studies.identification.tables import ForcedTable, ImpactsTable, Prior, Sought
 
 TRUTH = np.array([RATIO, STIFFNESS])
 STEP = 1e-6
@@ -101,8 +101,8 @@ BODY = {
     "damper": [{"cavity": "c1", "mass": 0.03, "friction": 0.25, "restitution": 0.6}],
 }
 OF_BODY = {
-    "damper.0.friction": Number(0.05, 0.9), "damper.0.restitution": Number(0.2, 0.95),
-    "cavity.c1.gap": Number(5e-4, 2e-3),
+    "damper.0.friction": Sought(0.05, 0.9), "damper.0.restitution": Sought(0.2, 0.95),
+    "cavity.c1.gap": Sought(5e-4, 2e-3),
 }  # fmt: skip
 
 
@@ -138,7 +138,7 @@ def test_directions_are_followed_from_their_neighbours():
     base, at = body(), [15.2, 15.3, 15.4]
     measured = forced("down", at, [7e-4, 9e-4, 1.1e-3], {}, noise=0.02, direction=["down"] * 3)
     fit = Fit(
-        IdentificationStudy(base, OF_BODY | {"structure.damping_ratio": Number(0.005, 0.02)}, [measured, measured])
+        IdentificationStudy(base, OF_BODY | {"structure.damping_ratio": Sought(0.005, 0.02)}, [measured, measured])
     )
     found = fit.models[0].quick(np.array([0.25, 0.6, 1e-3, 0.01])).values["amplitude"]
     before, chained = None, []
@@ -150,7 +150,9 @@ def test_directions_are_followed_from_their_neighbours():
 
 
 def test_density_and_its_gradient():
-    numbers = oscillator.NUMBERS | {"structure.damping_ratio": Number(0.002, 0.05, 0.02, "log", Prior(0.012, 0.002))}
+    numbers = oscillator.NUMBERS | {
+        "structure.damping_ratio": Sought(0.002, 0.05, 0.02, Prior(0.012, 0.002), scale="log")
+    }
     density = LogDensity(study(numbers=numbers))
     near = TRUTH * [1.05, 1.001]
     exact = slopes(lambda values: np.array([density(values)]), near)[0]
@@ -179,7 +181,7 @@ def of_gap(frequency, amplitude, **changes):
     """The density of a gap by amplitudes (n,) at frequencies (n,), Hz."""
     measured = forced("sweep", frequency, amplitude, {}, noise=0.02)
     return LogDensity(
-        IdentificationStudy(oscillator.scene(**FREE | changes), {"cavity.c1.gap": Number(1e-3, 2e-3)}, [measured])
+        IdentificationStudy(oscillator.scene(**FREE | changes), {"cavity.c1.gap": Sought(1e-3, 2e-3)}, [measured])
     )
 
 

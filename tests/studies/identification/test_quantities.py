@@ -11,7 +11,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.studies.identification.data import forced
 from vanedamp.studies.identification.fit import Fit
 from vanedamp.studies.identification.study import IdentificationStudy
-from vanedamp.studies.identification.tables import ForcedTable, Number
+from vanedamp.studies.identification.tables import ForcedTable, Sought
 
 __all__ = ["file"]
 AT, FORCE = FIRST * np.array([0.97, 0.99, 1.0, 1.01, 1.02]), 20.0
@@ -32,7 +32,7 @@ def test_a_force_is_told_by_a_strain_gauge(file):
                   time={"periods": 700, "transient": 650})  # fmt: skip
     table = ForcedTable("", noise=0.01, measure=GAUGE)
     measured = forced("gauge", AT, stress(FORCE), {}, table)
-    sought = IdentificationStudy(given, {"excitation.force": Number(5.0, 40.0)}, [measured])
+    sought = IdentificationStudy(given, {"excitation.force": Sought(5.0, 40.0)}, [measured])
     fit, z = Fit(sought), sought.coordinates([FORCE])
     assert np.abs(fit.residual(z)).max() < 0.1  # in 1 % of noise: samples miss peaks by less than 1e-3
     assert fit.jacobian(z)[:, 0] == pytest.approx(35.0 / FORCE / 0.01, rel=1e-3)  # the logarithm of a linear response

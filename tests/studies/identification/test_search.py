@@ -25,7 +25,7 @@ from vanedamp.studies.identification.record import Identification, Identificatio
 from vanedamp.studies.identification.search import identify
 from vanedamp.studies.identification.study import IdentificationStudy
 from vanedamp.studies.identification.summary import noise_texts
-from vanedamp.studies.identification.tables import Number, SearchTable
+from vanedamp.studies.identification.tables import SearchTable, Sought
 from vanedamp.studies.jobs.workers import WorkerPool
 
 QUICK = SearchTable(candidates=8, starts=1)
@@ -93,7 +93,7 @@ def test_a_body_that_sticks_tells_nothing_of_friction():
     base, at = body().replace({"excitation.force": 0.02}), [15.2, 15.5, 15.6, 15.8, 16.1]
     amplitude = [simulate(base.replace({"excitation.frequency": frequency})).amplitude_mean for frequency in at]
     measured = [forced("low", at, amplitude, {}, noise=0.02)]
-    numbers = {"damper.0.friction": Number(0.15, 0.8), "structure.damping_ratio": Number(0.005, 0.02)}
+    numbers = {"damper.0.friction": Sought(0.15, 0.8), "structure.damping_ratio": Sought(0.005, 0.02)}
     record = identify(IdentificationStudy(base, numbers, measured, SearchTable(candidates=4, starts=1)))
     assert record.status is IdentificationStatus.FLAT and record.flat == ("damper.0.friction",)
     assert record.notes[0] == "damper.0.friction: flat, the measurements do not tell it between 0.15 and 0.8"

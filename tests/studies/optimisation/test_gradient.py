@@ -11,7 +11,8 @@ from vanedamp.studies.cli import main
 from vanedamp.studies.optimisation.gradient import _Surface
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import optimise
-from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
+from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.tables import NO_DEVIATION
 
 
 def study(damper=(), periods=300, damping=0.02, band=(2340.0, 2436.0, 4), **optimise):

@@ -9,7 +9,8 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.studies.kinds.optimisation.charts import optimisation_figure
 from vanedamp.studies.optimisation.record import Optimisation
 from vanedamp.studies.optimisation.search import optimise
-from vanedamp.studies.optimisation.study import NO_DEVIATION, Design, Study
+from vanedamp.studies.optimisation.study import Design, Study
+from vanedamp.studies.optimisation.tables import NO_DEVIATION
 
 RIGID = {"model": "rigid", "mass": 1.0, "stiffness": 1e6, "damping_ratio": 0.01}
 WEAR = {"rate": 1e-15, "impact_rate": 1e-13, "area": 1e-6}

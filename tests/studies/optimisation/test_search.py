@@ -329,7 +329,13 @@ def test_command(tmp_path, capsys, monkeypatch):
         (lambda data: data["optimise"]["tolerances"].update(orientation_deg=100.0), "gravity lifts the body"),
         (lambda data: data["excitation"].pop("resonance_amplitude"), "excitation: name force or resonance_amplitude"),
         (lambda data: data.pop("damper"), "damper: missing"),
-        (lambda data: data["damper"][0].update(stiffness=1e5), "the search is for sliders"),
+        (
+            lambda data: (
+                data["damper"][0].update(shape="auto", length=0.01, height=0.005)
+                or [cavity.update(play=1e-5) for cavity in data["cavity"]]
+            ),
+            "damper.shape: name one",
+        ),
         (lambda data: data["structure"].update(damping_ratio=0.0), "an undamped resonance has no amplitude"),
         (
             lambda data: data.update(time={"periods": 150, "transient": 100}),
