@@ -51,8 +51,8 @@ def tuned_text(source: Path, calibration: Calibration, target: Path) -> str:
     tuning = calibration.tuning
     if tuning is not None:
         reached = ", ".join(f"{value:.6g}" for value in tuning.after_hz)
-        asked = ", ".join(f"{value:.6g}" for value in tuning.target_hz)
-        notes.append(f"Frequencies: {reached} Hz, measured {asked} Hz.")
+        measured = ", ".join(f"{value:.6g}" for value in tuning.target_hz)
+        notes.append(f"Frequencies: {reached} Hz, measured {measured} Hz.")
         for name, factor in zip(tuning.names, tuning.factors.tolist(), strict=True):
             _tune(document, name, factor)
     if calibration.damping is not None:
@@ -155,9 +155,9 @@ def _tune(document: tomlkit.TOMLDocument, name: str, factor: float) -> None:
         return
     materials: Any = document["material"]
     if group not in materials:  # so far it had the default's
-        own = tomlkit.inline_table() if isinstance(materials, InlineTable) else tomlkit.table()
-        own.update(materials["default"].unwrap())
-        materials[group] = own
+        table = tomlkit.inline_table() if isinstance(materials, InlineTable) else tomlkit.table()
+        table.update(materials["default"].unwrap())
+        materials[group] = table
     for key in ("young", "young_at"):
         if key in materials[group]:
             _scale(materials[group], key, factor)
@@ -170,11 +170,11 @@ def _scale(table: AbstractTable, key: str, factor: float) -> None:
     if not isinstance(old, Array):
         _change(table, key, factor * old, note)
         return
-    for place, entry in enumerate(old):
+    for index, entry in enumerate(old):
         if isinstance(entry, Array):
             entry[1] = _number(factor * entry[1])
         else:
-            old[place] = _number(factor * entry)
+            old[index] = _number(factor * entry)
     _remark(table, key, note)
 
 
@@ -210,12 +210,12 @@ def _rebase(document: tomlkit.TOMLDocument, old: Path, new: Path) -> None:
     """Name the files of a case from another folder."""
     if old == new:
         return
-    for place in FILES:
+    for key_path in FILES:
         table: Any = document
-        for step in place[:-1]:
+        for step in key_path[:-1]:
             table = table.get(step, {})
-        if place[-1] in table and not Path(table[place[-1]]).is_absolute():
-            table[place[-1]] = os.path.relpath(old / table[place[-1]], new)
+        if key_path[-1] in table and not Path(table[key_path[-1]]).is_absolute():
+            table[key_path[-1]] = os.path.relpath(old / table[key_path[-1]], new)
 
 
 def _rebased_schema(line: str, source: Path, target: Path) -> str:

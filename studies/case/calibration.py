@@ -136,11 +136,11 @@ class Calibration:
     def to_json(self) -> dict[str, Any]:
         """Return the result as plain data."""
         record = self.record
-        told = record.plain()
+        data = record.plain()
         return {
             "status": "ok",
             "frequency_hz": record.frequencies_hz.tolist(),
-            **{name: told[name] for name in ("first_bending", "rigid", "cavity", "damping", "excitation")},
+            **{name: data[name] for name in ("first_bending", "rigid", "cavity", "damping", "excitation")},
             "tuning": None if self.tuning is None else _tuning_json(self.tuning, self.case),
             "warnings": list(self.warnings),
             "wall_time_s": self.wall_time_s,
@@ -192,8 +192,8 @@ def calibrate(case: Case, checkpoint: str | Path | None = None) -> Calibration:
     if table.tune is not None:
         # what follows the tuning may be changed before it resumes
         tuned = replace(case, calibration=CalibrationTable(tune=table.tune))
-        with CaseCheckpoint(checkpoint, "calibrate", tuned, structure.matrices) as kept:
-            tuning = _tuned(structure, table.tune, kept.next)
+        with CaseCheckpoint(checkpoint, "calibrate", tuned, structure.matrices) as memo:
+            tuning = _tuned(structure, table.tune, memo.next)
         structure = assemble(tuned_case(case, dict(zip(tuning.names, tuning.factors.tolist(), strict=True)), structure))
     analysis = modal_analysis(structure)
     if analysis.first_bending is None or analysis.functional is None:
@@ -217,9 +217,9 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
     """Return the case with Young's moduli and support stiffnesses times their factors."""
     material: dict[str, MaterialTable] = dict(case.material)
     elastic = dict(case.support.elastic)
-    known = parts_by_name(case, structure.solid.domain.volumes)
+    parts = parts_by_name(case, structure.solid.domain.volumes)
     for name, factor in factors.items():
-        for part in known[name]:
+        for part in parts[name]:
             kind, group = part.split(".", 1)
             if kind == "support":
                 springs = elastic[group]
@@ -231,26 +231,26 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
                     tangential=factor * springs.tangential,
                 )
             else:
-                own = material.get(group, case.material.get("default"))
-                assert own is not None
-                young_at = tuple((temperature, factor * young) for temperature, young in own.young_at)
-                material[group] = replace(own, young=factor * own.young, young_at=young_at)
+                table = material.get(group, case.material.get("default"))
+                assert table is not None
+                young_at = tuple((temperature, factor * young) for temperature, young in table.young_at)
+                material[group] = replace(table, young=factor * table.young, young_at=young_at)
     return replace(case, material=material, support=replace(case.support, elastic=elastic))
 
 
 @stage("tuning to the measured frequencies")
 def _tuned(structure: Structure, table: TuneTable, keep: Keep) -> Tuning:
     """Return what tunes the structure. Raises InputError for an unknown name in `vary`, and for parts that overlap."""
-    known = parts_by_name(structure.case, structure.solid.domain.volumes)
+    parts = parts_by_name(structure.case, structure.solid.domain.volumes)
     seen: set[str] = set()
     for name in table.vary:
-        if name not in known:
-            raise InputError(f"calibration.tune.vary: no part '{name}'; {nearest(name, list(known))}")
-        if seen & set(known[name]):
+        if name not in parts:
+            raise InputError(f"calibration.tune.vary: no part '{name}'; {nearest(name, list(parts))}")
+        if seen & set(parts[name]):
             raise InputError(f"calibration.tune.vary: '{name}' holds a part that another name holds, too; name it once")
-        seen |= set(known[name])
-    parts = structure.solid.stiffness_parts()
-    varied = {name: sparse.csr_array(sum(parts[part] for part in known[name])) for name in table.vary}
+        seen |= set(parts[name])
+    stiffness = structure.solid.stiffness_parts()
+    varied = {name: sparse.csr_array(sum(stiffness[part] for part in parts[name])) for name in table.vary}
     measured = None if table.shapes is None else read_shapes(table.shapes)
     return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts, keep=keep)
 
@@ -322,7 +322,7 @@ def parts_by_name(case: Case, volumes: Iterable[str]) -> dict[str, list[str]]:
     """Return every name that `vary` may hold, with the parts of Solid.stiffness_parts that it stands for."""
     groups = list(volumes)
     names = {f"material.{group}": [f"material.{group}"] for group in groups}
-    rest = [f"material.{group}" for group in groups if group not in case.material]
-    if "default" in case.material and rest:
-        names["material.default"] = rest
+    default_groups = [f"material.{group}" for group in groups if group not in case.material]
+    if "default" in case.material and default_groups:
+        names["material.default"] = default_groups
     return names | {f"support.{group}": [f"support.{group}"] for group in case.support.elastic}

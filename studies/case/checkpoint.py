@@ -33,10 +33,10 @@ class CaseCheckpoint(CheckpointFile):
         super().__init__(path, f"{command}-checkpoint", belongs, self._content)
         self._solutions: list[dict[str, np.ndarray]] = []
         self._asked, self._kept = 0, path is not None
-        if (found := self.read()) is not None:
-            self._solutions = [{} for _ in found[0]["solution"]]
-            for place, values in found[0].items():
-                name, of, number = place.partition(" ")
+        if (content := self.read()) is not None:
+            self._solutions = [{} for _ in content[0]["solution"]]
+            for key, values in content[0].items():
+                name, of, number = key.partition(" ")
                 if of:  # no dimension
                     self._solutions[int(number)] |= {name: values}
 
@@ -51,11 +51,11 @@ class CaseCheckpoint(CheckpointFile):
         self._asked += 1
         if self._asked <= len(self._solutions):
             return self._solutions[self._asked - 1]
-        found = solve()
+        solution = solve()
         if self._kept:
-            self._solutions.append(dict(found))
+            self._solutions.append(dict(solution))
             self.changed()
-        return found
+        return solution
 
     def _content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
         variables = {"solution": Variable(np.arange(len(self._solutions)), ("solution",))}

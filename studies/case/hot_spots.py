@@ -42,7 +42,7 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1) ->
     use = np.array([np.where(excluded, 0.0, _equivalent(structure, shape) / permitted) for shape in shapes])
     apart = case.hot_spots.distance or _APART * float(np.ptp(solid.stress_points(), axis=0).max())
     picked, shown = chosen_places(use, solid.stress_points(), spots, apart)
-    names, points = [f"hot{index + 1}" for index in range(spots)], np.array([place for place, _ in picked])
+    names, points = [f"hot{index + 1}" for index in range(spots)], np.array([point for point, _ in picked])
 
     def stresses(vectors: np.ndarray) -> dict[str, np.ndarray]:
         values = solid.stress_components(vectors.T, points)
@@ -73,8 +73,8 @@ def chosen_places(
     shown = np.where(top > 0.0, 0.0, 1.0)
     free, picked = np.ones(len(places), dtype=bool), list[tuple[int, int]]()
     while len(picked) < count:
-        left = np.where(free, relative, 0.0)
-        most = left.max(axis=1)
+        available = np.where(free, relative, 0.0)
+        most = available.max(axis=1)
         if not most.any():
             raise InputError(
                 f"hot spots: {len(picked)} are all that lie {apart:.4g} m apart and are not excluded; ask for fewer, "
@@ -82,10 +82,10 @@ def chosen_places(
             )
         open_modes = np.flatnonzero((shown < SHOWN) & (most > shown))
         mode = int(open_modes[0] if open_modes.size else np.flatnonzero(most)[0])
-        place = first_largest(left[mode])
-        picked.append((place, mode))
-        shown = np.maximum(shown, relative[:, place])
-        free &= np.linalg.norm(places - places[place], axis=1) >= apart
+        point = first_largest(available[mode])
+        picked.append((point, mode))
+        shown = np.maximum(shown, relative[:, point])
+        free &= np.linalg.norm(places - places[point], axis=1) >= apart
     return picked, shown
 
 
@@ -104,13 +104,13 @@ def _equivalent(structure: Structure, shape: np.ndarray) -> np.ndarray:
     """Return the stress (k,), Pa, of a displacement field that counts at every place, by its material's criterion."""
     solid = structure.solid
     stress = solid.stress_components(shape)
-    found = von_mises(stress)
+    equivalent = von_mises(stress)
     for number, name in enumerate(solid.domain.volumes):
         data = structure.case.fatigue(name)
         if data is not None and data.criterion == "principal":
-            own = solid.recovery.groups == number
-            found[own] = np.abs(largest_principal(stress[:, own]))
-    return found
+            in_group = solid.recovery.groups == number
+            equivalent[in_group] = np.abs(largest_principal(stress[:, in_group]))
+    return equivalent
 
 
 def _permitted(structure: Structure) -> np.ndarray:
@@ -121,10 +121,10 @@ def _permitted(structure: Structure) -> np.ndarray:
     for cause, values in solid.static_stresses().items():
         static += values * (speed**2 if cause == "rotation" else 1.0)
     for number, name in enumerate(solid.domain.volumes):
-        data, own = case.fatigue(name), solid.recovery.groups == number
+        data, in_group = case.fatigue(name), solid.recovery.groups == number
         if data is not None and data.strength is not None:
-            mean = (largest_principal if data.criterion == "principal" else signed_von_mises)(static[:, own])
-            permitted[own] = np.maximum(permissible_amplitude(mean, data), _LEFT * data.strength)
+            mean = (largest_principal if data.criterion == "principal" else signed_von_mises)(static[:, in_group])
+            permitted[in_group] = np.maximum(permissible_amplitude(mean, data), _LEFT * data.strength)
     return permitted
 
 
@@ -133,7 +133,7 @@ def _facts(
 ) -> list[dict[str, Any]]:
     """Return the facts (rom.recovery.hot_spots) of places, each with its mode, by the modes' shapes (m, N)."""
     case, solid = structure.case, structure.solid
-    points = np.array([place for place, _ in picked])
+    points = np.array([point for point, _ in picked])
     groups, recovery = list(solid.domain.volumes), solid.recovery
     static, doubts = solid.static_stresses(points), solid.static_errors(points)
     facts = []
@@ -141,15 +141,15 @@ def _facts(
         group = groups[recovery.groups[point]]
         spot: dict[str, Any] = {"coordinates": recovery.places[point].tolist(), "group": group}
         frequency = float(model.natural_frequencies_hz[model.rigid_modes + mode])
-        own = _per_amplitude(structure, model, shapes[mode], mode, point)
-        spot |= {"mode": {"number": mode + 1, "frequency_hz": frequency} | own, "error": own["error"]}
-        first = _per_amplitude(structure, model, shapes[0], 0, point) if mode else own
+        of_mode = _per_amplitude(structure, model, shapes[mode], mode, point)
+        spot |= {"mode": {"number": mode + 1, "frequency_hz": frequency} | of_mode, "error": of_mode["error"]}
+        first = _per_amplitude(structure, model, shapes[0], 0, point) if mode else of_mode
         if "at" in first:
             spot["per_amplitude"] = {key: first[key] for key in ("at", "von_mises", "error")}
         spot["static"] = {cause: values[:, index].tolist() for cause, values in static.items()}
         spot["static_error"] = {cause: float(values[index]) for cause, values in doubts.items()}
-        if found := singular_point(solid, point, structure.matrices):
-            spot["singular"] = found
+        if singular := singular_point(solid, point, structure.matrices):
+            spot["singular"] = singular
         data = case.fatigue(group)
         spot["fatigue"] = {} if data is None else tables(data)
         facts.append(spot)
@@ -164,7 +164,7 @@ def _per_amplitude(
     """
     stress = float(von_mises(structure.solid.stress_components(shape, np.array([point])))[0])
     error = float(structure.solid.stress_errors(shape, np.array([point]))[0])
-    found: dict[str, Any] = {"error": error / stress if stress else 0.0}
+    facts: dict[str, Any] = {"error": error / stress if stress else 0.0}
     moved = np.abs(model.selection @ model.natural[1][:, model.rigid_modes + mode]) * (model.lengths == 1.0)
     least = MOVES * np.linalg.norm(shape.reshape(-1, 3), axis=1).max()
     label = structure.case.response_label
@@ -172,5 +172,5 @@ def _per_amplitude(
     if moved[at] < least:
         at = int(np.argmax(moved))
     if moved[at] >= least:
-        found |= {"at": model.interface[at], "von_mises": stress / float(moved[at])}
-    return found
+        facts |= {"at": model.interface[at], "von_mises": stress / float(moved[at])}
+    return facts

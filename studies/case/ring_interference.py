@@ -35,18 +35,18 @@ def ring_interference(
     an engine order that is no whole number.
     """
     table, rotation = structure.case.campbell, structure.case.rotation
-    given = orders or (table.engine_orders if table else ()) or ()
-    if any(order != int(order) or order < 1 for order in given):
+    engine_orders = orders or (table.engine_orders if table else ()) or ()
+    if any(order != int(order) or order < 1 for order in engine_orders):
         raise InputError("engine orders: expected whole numbers from 1, since a fraction excites every nodal diameter")
     speed = rotation.omega if rotation is not None else None
     if operating is None and table is not None:
         operating = table.operation
     if operating is None and speed:
         operating = ((1.0 - _ABOUT) * speed, (1.0 + _ABOUT) * speed)
-    found = Interference(modes, tuple(int(order) for order in given), speed, operating)
+    interference = Interference(modes, tuple(int(order) for order in engine_orders), speed, operating)
     if table is None:
-        return found
-    wanted = replace(table, modes=int(modes.families.max()) + 1, engine_orders=found.orders)
+        return interference
+    wanted = replace(table, modes=int(modes.families.max()) + 1, engine_orders=interference.orders)
     diagram = campbell_diagram(replace(structure, case=replace(structure.case, campbell=wanted)), report, checkpoint)
     rows = {pair: row for row, pair in enumerate(_pairs(modes))}
     curves = [rows.get(pair) for pair in _pairs(diagram)]
@@ -54,9 +54,9 @@ def ring_interference(
     for row, curve in zip(curves, diagram.frequencies_hz, strict=True):
         if row is not None:
             over[row] = curve
-    crossings = [(each, curves[each.mode]) for each in diagram.crossings]
-    kept = tuple(replace(each, mode=row) for each, row in crossings if row is not None)
-    return replace(found, speeds=diagram.speeds, over_speed_hz=over, crossings=kept)
+    crossings = [(crossing, curves[crossing.mode]) for crossing in diagram.crossings]
+    renumbered = tuple(replace(crossing, mode=row) for crossing, row in crossings if row is not None)
+    return replace(interference, speeds=diagram.speeds, over_speed_hz=over, crossings=renumbered)
 
 
 def _pairs(modes: RingModes | Campbell) -> list[tuple[int, int]]:

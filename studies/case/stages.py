@@ -164,13 +164,13 @@ def _coordinates(label: str, table: InterfaceTable, matrices: SystemMatrices) ->
 
 
 def _direction(
-    label: str, key: str, given: tuple[float, float, float] | str, table: InterfaceTable, matrices: SystemMatrices
+    label: str, key: str, choice: tuple[float, float, float] | str, table: InterfaceTable, matrices: SystemMatrices
 ) -> tuple[float, float, float]:
     """Return a direction of a table: numbers, "normal" for its facets' own, or the normal of a facet group."""
-    if not isinstance(given, str):
-        return given
+    if not isinstance(choice, str):
+        return choice
     try:
-        return normal_direction(matrices, table.facets) if given == "normal" else outward_normal(matrices, given)
+        return normal_direction(matrices, table.facets) if choice == "normal" else outward_normal(matrices, choice)
     except InterfaceError as error:
         raise InputError(f"interface.{label}.{key}: {error}") from None
 
@@ -287,17 +287,17 @@ class ModalAnalysis:
             field = nodal_von_mises(self.structure.solid, shape / (self.functional @ shape))
             variables["von_mises"] = Variable(field, ("node",), "Pa/m")
         if self.fatigue is not None:
-            stress, places, groups, errors, singular = zip(*self.fatigue.peaks, strict=True)
+            stress, positions, groups, errors, singular = zip(*self.fatigue.peaks, strict=True)
             variables |= {
                 "volume": Variable(np.array(groups, dtype=object), ("volume",)),
                 "stress_per_amplitude": Variable(np.array(stress), ("volume",), "Pa/m"),
-                "stress_place": Variable(np.array(places), ("volume", "axis"), "m"),
+                "stress_place": Variable(np.array(positions), ("volume", "axis"), "m"),
                 "stress_error": Variable(np.array(errors), ("volume",)),
                 "stress_singular": Variable(np.array(singular, dtype=object), ("volume",)),
             }
         result = self.to_json()
-        kept = ("first_bending", "rigid", "cavity", "fatigue", "speed")
-        attributes = {name: result[name] for name in kept if result.get(name) not in (None, {})}
+        keys = ("first_bending", "rigid", "cavity", "fatigue", "speed")
+        attributes = {name: result[name] for name in keys if result.get(name) not in (None, {})}
         attributes |= {"damping_ratio": self.structure.matrices.damping_ratio}
         attributes |= {"vtk_cell_type": cell_type, "versions": versions()}
         self.modes.save(path, variables, attributes)
@@ -446,23 +446,23 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
 def joint_doubts(structure: Structure, modes: Modes | None = None) -> tuple[str, ...]:
     """Return warnings of nodes that lie where others do, and of modes of a held structure without strain."""
     matrices, support = structure.matrices, structure.case.support
-    found, twins = [], coincident_nodes(matrices)
+    warnings, twins = [], coincident_nodes(matrices)
     if twins.size:
-        place = ", ".join(f"{x:.4g}" for x in matrices.coordinates[twins[0]])
-        found.append(
-            f"mesh: {twins.size} nodes lie where others do, such as at ({place}) m: parts are not joined there; merge "
+        point = ", ".join(f"{x:.4g}" for x in matrices.coordinates[twins[0]])
+        warnings.append(
+            f"mesh: {twins.size} nodes lie where others do, such as at ({point}) m: parts are not joined there; merge "
             "the nodes, unless a gap is meant"
         )
     if modes is not None and (support.clamped or support.elastic):
-        whole, parts = free_motions(modes, matrices)
+        whole, relative = free_motions(modes, matrices)
         if whole:
-            found.append(f"support: leaves {whole} motions of the whole structure free (0 Hz); hold it against them")
-        if parts:
-            found.append(
-                f"modes: {parts} at 0 Hz move parts of the structure against each other, which hang together by an "
+            warnings.append(f"support: leaves {whole} motions of the whole structure free (0 Hz); hold it against them")
+        if relative:
+            warnings.append(
+                f"modes: {relative} at 0 Hz move parts of the structure against each other, which hang together by an "
                 "edge or a point only; join their nodes"
             )
-    return tuple(found)
+    return tuple(warnings)
 
 
 def campbell_diagram(
@@ -484,10 +484,10 @@ def campbell_diagram(
     if table.modes > most:
         raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
     ring = structure.case.ring
-    made = campbell if ring is None else partial(ring_campbell, ring.sector(rotating.standing, rotation))
-    with CaseCheckpoint(checkpoint, "campbell", replace(structure.case, calibration=None), structure.matrices) as kept:
-        diagram = made(
-            rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report, keep=kept.next
+    solve = campbell if ring is None else partial(ring_campbell, ring.sector(rotating.standing, rotation))
+    with CaseCheckpoint(checkpoint, "campbell", replace(structure.case, calibration=None), structure.matrices) as memo:
+        diagram = solve(
+            rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report, keep=memo.next
         )
     provenance = {"matrices": dict(diagram.provenance), "versions": versions()}
     return replace(diagram, operating=table.operation, provenance=provenance)
@@ -519,7 +519,7 @@ def reduction(
     rotating = structure.rotating_to(greatest) if greatest else None
     levelled = level and structure.case.response_label is not None and bool(structure.case.fatigue_strength)
     recovery = keep_recovery or bool(spots) or levelled
-    found = basis_named(basis)
+    chosen_basis = basis_named(basis)
     coordinates = interface(structure.case, structure.matrices)
     at = structure.case.response_label or coordinates.labels[0]
     most = min(_MOST, structure.matrices.free.size // 4)
@@ -528,10 +528,10 @@ def reduction(
         with stage(f"basis of {asked} modes"):
             if rotating is None:
                 bases = None
-                rich = [found.rich(structure.matrices, coordinates, asked, factorize, 1 + BLOCKS, recovery)]
+                rich = [chosen_basis.rich(structure.matrices, coordinates, asked, factorize, 1 + BLOCKS, recovery)]
             else:
-                assert found.speeds is not None  # as _greatest_speed has checked
-                bases = found.speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
+                assert chosen_basis.speeds is not None  # as _greatest_speed has checked
+                bases = chosen_basis.speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
                 rich = [bases.model_at(speed) for speed in (0.0, greatest)]
         with stage("estimate of the error"):
             grids = [_of_interest(model, max_frequency, structure.case) for model in rich]
@@ -546,13 +546,13 @@ def reduction(
     covered = [min(float(grid[0]) for grid in grids), max(float(grid[-1]) for grid in grids)]
     estimate = choice.to_json() | {"frequencies_hz": covered}
     if bases is None:
-        model = found.cut(rich[0], choice.chosen.modes)
+        model = chosen_basis.cut(rich[0], choice.chosen.modes)
     else:
         of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
         with stage("speeds of rotation"):
             model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)
-    made = {"basis": basis, "estimate": estimate, "versions": versions()}
-    model = replace(model, provenance=dict(model.provenance) | made)
+    provenance = {"basis": basis, "estimate": estimate, "versions": versions()}
+    model = replace(model, provenance=dict(model.provenance) | provenance)
     if levelled:
         model = replace(model, provenance=dict(model.provenance) | {"fatigue": _level_of(structure, model, at)})
     if spots:
@@ -562,11 +562,11 @@ def reduction(
 
 def reduction_warnings(structure: Structure, model: ReducedModel) -> tuple[str, ...]:
     """Return what to look at in a reduced model: units, joints, strengths, and stresses that the mesh decides."""
-    made = model.provenance
-    found = unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])) + joint_doubts(structure)
-    if made.get("fatigue") is not None or "hot_spots" in made:
-        found += strength_warnings(structure)
-    return found + tuple(spot_warnings(made))
+    provenance = model.provenance
+    warnings = unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])) + joint_doubts(structure)
+    if provenance.get("fatigue") is not None or "hot_spots" in provenance:
+        warnings += strength_warnings(structure)
+    return warnings + tuple(spot_warnings(provenance))
 
 
 def _level_of(structure: Structure, model: ReducedModel, at: str) -> dict[str, Any] | None:

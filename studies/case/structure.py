@@ -38,11 +38,13 @@ class Structure:
 
         Raises modal.rotating.UnstableError for a speed without a stable equilibrium.
         """
-        given = self.turning
-        assert given is not None
-        if speed == given.greatest:
-            return given
-        return self.solid.rotating(given.standing, given.axis.tolist(), given.point.tolist(), given.statics, speed)
+        rotating = self.turning
+        assert rotating is not None
+        if speed == rotating.greatest:
+            return rotating
+        return self.solid.rotating(
+            rotating.standing, rotating.axis.tolist(), rotating.point.tolist(), rotating.statics, speed
+        )
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
         """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""

@@ -83,12 +83,12 @@ class _Generated:
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        made = handler(schema)
-        table = handler.resolve_ref_schema(made)
+        json_schema = handler(schema)
+        table = handler.resolve_ref_schema(json_schema)
         parameters = handler.resolve_ref_schema(table["properties"].pop("parameters"))
         table["properties"] |= parameters["properties"]
         table["required"] = [*parameters.get("required", ()), "generator"]
-        return made
+        return json_schema
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -152,12 +152,12 @@ def _gather(table: Any) -> Any:
     """Return the table with a generator's parameters in a table of their own."""
     if not isinstance(table, Mapping) or "generator" not in table:
         return table
-    own = {key: table[key] for key in ("generator", "degree") if key in table}
-    parameters = {key: value for key, value in table.items() if key not in own}
+    common = {key: table[key] for key in ("generator", "degree") if key in table}
+    parameters = {key: value for key, value in table.items() if key not in common}
     for key, value in parameters.items():
         if isinstance(value, str):  # the generators' records would take "3" for 3
             raise ValueError(f"{key}: expected a number, not {value!r}")
-    return own | {"parameters": parameters}
+    return common | {"parameters": parameters}
 
 
 Mesh = Annotated[
@@ -227,8 +227,8 @@ def _kind_of_material(table: Any) -> str:
 
 def without_strengths(materials: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables below [material] of a case without fatigue strengths and fatigue data."""
-    kept = {name: dict(table) for name, table in materials.items() if _kind_of_material(table) == "material"}
-    return {name: {key: kept[name][key] for key in kept[name] if not key.startswith("fatigue")} for name in kept}
+    plain = {name: dict(table) for name, table in materials.items() if _kind_of_material(table) == "material"}
+    return {name: {key: plain[name][key] for key in plain[name] if not key.startswith("fatigue")} for name in plain}
 
 
 def _one_kind(table: Any) -> Any:
@@ -423,8 +423,8 @@ class InterfaceTable:
     @property
     def guides(self) -> dict[str, str]:
         """The facet groups that give directions, by key."""
-        given = {"direction": self.direction, "normal": self.normal}
-        return {key: group for key, group in given.items() if isinstance(group, str) and group != "normal"}
+        directions = {"direction": self.direction, "normal": self.normal}
+        return {key: group for key, group in directions.items() if isinstance(group, str) and group != "normal"}
 
 
 @documented
@@ -458,8 +458,8 @@ class Case:
     """deviations of the sectors of the ring"""
 
     def __post_init__(self) -> None:
-        given = {table.damping_ratio for table in self.material.values()} - {None}
-        if self.modes.damping_ratio is None and len(given) > 1:
+        ratios = {table.damping_ratio for table in self.material.values()} - {None}
+        if self.modes.damping_ratio is None and len(ratios) > 1:
             raise ValueError("material: the damping ratios differ; set the one of the modes in [modes] damping_ratio")
         at, labels = self.modes.at, list(self.interface)
         if at is not None and at not in labels:
@@ -537,8 +537,8 @@ class Case:
     def without_strength(self, volumes: Iterable[str]) -> list[str]:
         """Return the volume groups for which the least strength of the others counts; none without any strength."""
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
-        known = self.fatigue_strength is not None
-        return [name for name, table in tables.items() if known and (table is None or table.own_strength is None)]
+        rated = self.fatigue_strength is not None
+        return [name for name, table in tables.items() if rated and (table is None or table.own_strength is None)]
 
     def fatigue(self, volume: str) -> Fatigue | None:
         """Return the complete fatigue data of a volume group's material; None without any.
@@ -577,12 +577,14 @@ class Case:
     ) -> None:
         """Raise InputError for a group that the mesh does not have; lower: kind ("edge", "point") -> groups."""
         surfaces = {"facet": list(facets)}
-        known = surfaces | {kind: list(names) for kind, names in (lower or {}).items()}
+        groups = surfaces | {kind: list(names) for kind, names in (lower or {}).items()}
         for group in self.support.clamped:
-            _check_group("support.clamped", group, known)
+            _check_group("support.clamped", group, groups)
         for group in self.hot_spots.exclude:
-            _check_group("hot_spots.exclude", group, known)
-        mixed = {group for group in surfaces["facet"] if any(group in known[kind] for kind in known if kind != "facet")}
+            _check_group("hot_spots.exclude", group, groups)
+        mixed = {
+            group for group in surfaces["facet"] if any(group in groups[kind] for kind in groups if kind != "facet")
+        }
         for group in self.support.elastic:
             _check_group(f"support.elastic.{group}", group, surfaces)
             if group in mixed:
@@ -592,9 +594,9 @@ class Case:
                 )
         for label, table in self.interface.items():
             for group in table.groups:
-                _check_group(f"interface.{label}.facets", group, known)
+                _check_group(f"interface.{label}.facets", group, groups)
             # a facet group weighs its nodes by area, others each by one
-            kinds = [kind for kind, names in known.items() if set(table.groups) & set(names)]
+            kinds = [kind for kind, names in groups.items() if set(table.groups) & set(names)]
             if "facet" in kinds and len(kinds) > 1:
                 raise InputError(
                     f"interface.{label}.facets: groups of several kinds ({', '.join(sorted(kinds))}), whose nodes have "
@@ -638,10 +640,10 @@ def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -
             raise ValueError(
                 f"material.{group}.young_at: holds from {low:g} to {high:g}, without the reference {reference:g}"
             )
-        given = float(np.interp(reference, *np.transpose(table.young_at)))
-        if abs(given / table.young - 1.0) > _SAME_MODULUS:
+        modulus = float(np.interp(reference, *np.transpose(table.young_at)))
+        if abs(modulus / table.young - 1.0) > _SAME_MODULUS:
             raise ValueError(
-                f"material.{group}.young: is the modulus at the reference temperature, {given:.6g} Pa by young_at"
+                f"material.{group}.young: is the modulus at the reference temperature, {modulus:.6g} Pa by young_at"
             )
 
 
@@ -663,30 +665,30 @@ def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
     generator, file = mesh.get("generator"), mesh.get("file")
     if (generator is None) == (file is None):
         raise InputError(f"{path}: mesh: give one of file and generator")
-    known = ["file", "degree", "scale"]
+    keys = ["file", "degree", "scale"]
     if generator is not None:
         if str(generator) not in GENERATORS:
             raise InputError(
                 f"{path}: mesh.generator: no generator {generator!r}; {nearest(str(generator), list(GENERATORS))}"
             )
-        known = ["generator", "degree", *_names(GENERATORS[str(generator)])]
+        keys = ["generator", "degree", *_names(GENERATORS[str(generator)])]
     for key in mesh:
         owners = [f'generator = "{name}"' for name, record in GENERATORS.items() if key in _names(record)]
-        if key not in known and generator is None and owners:
+        if key not in keys and generator is None and owners:
             raise InputError(f"{path}: mesh.{key}: belongs to {' or '.join(owners)}, not to a file")
-        if key not in known:
-            raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, known)}")
+        if key not in keys:
+            raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, keys)}")
 
 
 def _names(record: Any) -> list[str]:
     return [item.name for item in fields(record)]
 
 
-def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:
+def _check_group(key: str, group: str, by_kind: Mapping[str, list[str]]) -> None:
     """Raise InputError for an unknown group, by kind; the first kind is the usual one."""
-    if any(group in names for names in known.values()):
+    if any(group in names for names in by_kind.values()):
         return
-    (kind, names), *others = known.items()
+    (kind, names), *others = by_kind.items()
     elsewhere = "".join(f"; {other} groups: {', '.join(sorted(groups))}" for other, groups in others if groups)
     raise InputError(
         f"{key}: no {kind} group '{group}' in the mesh; it has {', '.join(sorted(names)) or 'none'}{elsewhere}"
