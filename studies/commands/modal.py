@@ -43,10 +43,10 @@ def _summary(result: Mapping[str, Any]) -> Iterator[str]:
         )
         yield from cavity_lines(result)
     if "gyroscopic" in result:
-        found = result["gyroscopic"]
+        whirl = result["gyroscopic"]
         yield "with the gyroscopic coupling, in the rotating frame (whirl 1: with the rotation, -1: against it):"
         yield "mode  frequency/Hz      whirl   residual"
-        for index, row in enumerate(zip(found["frequency_hz"], found["whirl"], found["residual"], strict=True)):
+        for index, row in enumerate(zip(whirl["frequency_hz"], whirl["whirl"], whirl["residual"], strict=True)):
             yield "{:4}  {:12.2f}   {:8.4f}   {:.1e}".format(index + 1, *row)
     if "fatigue" in result:
         fatigue = result["fatigue"]

@@ -35,9 +35,9 @@ class Function:
         loaded: Callable[..., Any] = getattr(import_module(f"vanedamp.studies.{self.below}.{module}"), name)
         return loaded
 
-    def __call__(self, *given: Any) -> Any:
+    def __call__(self, *arguments: Any) -> Any:
         """Call it."""
-        return self.load()(*given)
+        return self.load()(*arguments)
 
 
 @dataclass(frozen=True)
@@ -84,11 +84,11 @@ class Command:
         if self.writes is not None:
             Function("support.outputs:prepare")(arguments, self.writes, self.checkpoint)
         try:
-            given = () if self.reads is None else (self.reads(arguments),)
+            inputs = () if self.reads is None else (self.reads(arguments),)
             if self.job:
-                Function("support.jobs:run")(arguments, self.work.load(), *given)
+                Function("support.jobs:run")(arguments, self.work.load(), *inputs)
             else:
-                self.work(arguments, *given)
+                self.work(arguments, *inputs)
         except VanedampError:
             self._refuse_other_kinds(arguments)
             raise
@@ -98,7 +98,7 @@ class Command:
         from vanedamp.files.toml_input import InputError
         from vanedamp.studies.file_kinds import another_kind, expected
 
-        given = [getattr(arguments, name, None) for name in ("input", "pipeline")]
-        for path in filter(None, (*given, *getattr(arguments, "inputs", ()))) if self.takes else ():
-            if told := another_kind(path, self.takes):
-                raise InputError(f"{path}: {told}; `vanedamp {self.NAME}` takes {expected(self.takes)}") from None
+        paths = [getattr(arguments, name, None) for name in ("input", "pipeline")]
+        for path in filter(None, (*paths, *getattr(arguments, "inputs", ()))) if self.takes else ():
+            if kind := another_kind(path, self.takes):
+                raise InputError(f"{path}: {kind}; `vanedamp {self.NAME}` takes {expected(self.takes)}") from None

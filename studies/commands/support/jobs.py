@@ -12,9 +12,9 @@ from vanedamp.studies.jobs.job import Job
 from vanedamp.studies.jobs.workers import available_cores, workers
 
 
-def run(arguments: Namespace, kind: type[Job], *given: Any) -> None:
+def run(arguments: Namespace, kind: type[Job], *inputs: Any) -> None:
     """Run the job of a command line, of what the command has read. Raises VanedampError."""
-    job = kind.of_arguments(arguments, *given)
+    job = kind.of_arguments(arguments, *inputs)
     arguments.outputs.keep(job.files)
     count = getattr(arguments, "workers", None)
     job.check(count or available_cores())

@@ -57,8 +57,8 @@ def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: 
     if _is_stdout(getattr(arguments, "json", None) or "-"):
         arguments.json = "-"
     named = [(option, getattr(arguments, option, None)) for option in dict.fromkeys(("output", "json", *suffixes))]
-    given = [(option, name) for option, name in (*named, ("output", beside)) if name is not None]
-    outputs = Outputs(tuple((f"--{option}", Path(name)) for option, name in given if (option, name) != ("json", "-")))
+    chosen = [(option, name) for option, name in (*named, ("output", beside)) if name is not None]
+    outputs = Outputs(tuple((f"--{option}", Path(name)) for option, name in chosen if (option, name) != ("json", "-")))
     for option, path in outputs.files:
         trouble = _trouble(path)
         if trouble is not None:
