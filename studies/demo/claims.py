@@ -113,26 +113,29 @@ def fig12(curves: Curves) -> list[Claim]:
 
 
 def _level(reduced: Curve, rigid: Curve) -> Claim:
-    top, other = reduced.peak(), rigid.peak()
+    top, rigid_top = reduced.peak(), rigid.peak()
     return claim(
         "The averaged amplitudes of both models agree, at about half of the maximum without bodies.",
-        f"highest means: reduced model {top}, rigid model {other}",
-        verdict(abs(top.height - other.height) < 0.1 and 0.35 < top.height < 0.6, abs(top.height - other.height) < 0.2),
-        figures={"reduced": top.height, "rigid": other.height, "confidence": top.confidence},
+        f"highest means: reduced model {top}, rigid model {rigid_top}",
+        verdict(
+            abs(top.height - rigid_top.height) < 0.1 and 0.35 < top.height < 0.6,
+            abs(top.height - rigid_top.height) < 0.2,
+        ),
+        figures={"reduced": top.height, "rigid": rigid_top.height, "confidence": top.confidence},
     )
 
 
 def onset(curve: Curve) -> Claim:
-    found = [_onset(start, each) for start, each in curve.each or (("", curve),)]
-    shown = [apart < 0.01 and points > 5 for _, apart, points in found]
+    onsets = [_onset(start, single) for start, single in curve.each or (("", curve),)]
+    shown = [apart < 0.01 and points > 5 for _, apart, points in onsets]
     return claim(
         "Up to an onset the damped curve is the one without bodies.",
-        "; ".join(text for text, _, _ in found),
+        "; ".join(text for text, _, _ in onsets),
         verdict(all(shown), any(shown)),
         "The runs begin at rest: their transient brings the body to the walls, and it goes on flying. A motion that "
         "grows slowly hits only from amplitudes of about half of the gap on. A body that hits as the frequency goes "
         "down goes on hitting below the onset.",
-        {"onset_hz": (curve.each[0][1] if curve.each else curve).onset, "difference": found[0][1]},
+        {"onset_hz": (curve.each[0][1] if curve.each else curve).onset, "difference": onsets[0][1]},
     )
 
 
@@ -156,16 +159,16 @@ def drop(curve: Curve) -> Claim:
     ratio = curve.smooth[above] / curve.fixed[above]
     low, median, high = (float(np.quantile(ratio, share)) for share in (0.0, 0.5, 1.0))
     at = curve.peak(curve.undamped).index
-    left, fixed = float(curve.mean[at]), float(curve.fixed[at])
+    level, fixed = float(curve.mean[at]), float(curve.fixed[at])
     return claim(
         "Above its peak the damped curve drops to that of the fixed body.",
-        f"at the undamped resonance {left:.3f} is left (fixed body: {fixed:.3f}); above the peak, wherever the body "
+        f"at the undamped resonance {level:.3f} is left (fixed body: {fixed:.3f}); above the peak, wherever the body "
         f"is touched, the smoothed mean is {low:.2f} to {high:.2f} times the fixed curve, in the median {median:.2f}",
         verdict(0.9 < median < 1.1 and high < 1.2, median < 1.1),
         "It drops through the fixed curve: the impacts not only attach mass, they take energy as well, the more the "
         "wider the gap (reference/10 stays close to the fixed curve). Farther up they end, and a body at rest in "
         "the middle leaves the curve without bodies.",
-        {"at_resonance": left, "ratio_low": low, "ratio_median": median, "ratio_high": high},
+        {"at_resonance": level, "ratio_low": low, "ratio_median": median, "ratio_high": high},
     )
 
 

@@ -134,10 +134,10 @@ def worst_of(curves: Sequence[Curve], words: Sequence[str]) -> Curve:
         for row, (curve, at) in enumerate(zip(curves, shown, strict=True)):
             whole[name][row, at] = getattr(curve, name)
     worst = whole["mean"].argmax(axis=0)
-    found = {name: values[worst, np.arange(len(frequency))] for name, values in whole.items()}
-    found |= {"largest": whole["largest"].max(axis=0), "periodic": found["periodic"] == 1.0}
+    arrays = {name: values[worst, np.arange(len(frequency))] for name, values in whole.items()}
+    arrays |= {"largest": whole["largest"].max(axis=0), "periodic": arrays["periodic"] == 1.0}
     return replace(
-        curves[0], **found, starts=tuple(words[row] for row in worst), each=tuple(zip(words, curves, strict=True))
+        curves[0], **arrays, starts=tuple(words[row] for row in worst), each=tuple(zip(words, curves, strict=True))
     )
 
 

@@ -225,8 +225,8 @@ def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
         count = table.get("count", 1)
         table = {key: value for key, value in table.items() if key != "count"}
         homes = names.get(table["cavity"], [table["cavity"]])
-        for place, home in enumerate(homes):
-            aside = ((place + 0.5) / len(homes) - 0.5) / 2
-            own = {"position": aside * gaps.get(home, 0.0)} if count == 1 else {}
-            dampers += [own | table | {"cavity": home}] * count
+        for number, home in enumerate(homes):
+            aside = ((number + 0.5) / len(homes) - 0.5) / 2
+            start = {"position": aside * gaps.get(home, 0.0)} if count == 1 else {}
+            dampers += [start | table | {"cavity": home}] * count
     return tables | {"cavity": cavities, "damper": dampers}

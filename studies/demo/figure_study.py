@@ -55,11 +55,11 @@ class Session:
 
     def read(self, sweep: Sweep, name: str) -> list[Curve]:
         """Return the curves of a sweep, each the worst over the starts of the effort."""
-        found, starts = curves(sweep, name), [] if self.effort is None else [STARTS[key] for key in self.effort.starts]
+        lines, starts = curves(sweep, name), [] if self.effort is None else [STARTS[key] for key in self.effort.starts]
         if not starts:
-            return found
-        count = len(found) // len(starts)
-        return [worst_of(found[place::count], starts) for place in range(count)]
+            return lines
+        count = len(lines) // len(starts)
+        return [worst_of(lines[index::count], starts) for index in range(count)]
 
     def swept(self, figure: FigureScenes, curve: str) -> Sweep:
         """Run the sweep of a curve, and write its scene (.toml) and result (.h5)."""
