@@ -47,12 +47,12 @@ def export(result: str | os.PathLike[str] | Saved, path: str | os.PathLike[str],
 
 def format_of(path: str | os.PathLike[str]) -> Format:
     """Return the format of a file's ending. Raises InputError."""
-    known = FORMATS.all()
-    for part in known.values():
-        if Path(path).suffix.lower() in part.ENDINGS:
-            found: Format = part
-            return found
-    endings = ", ".join(ending for part in known.values() for ending in part.ENDINGS)
+    formats = FORMATS.all()
+    for candidate in formats.values():
+        if Path(path).suffix.lower() in candidate.ENDINGS:
+            chosen: Format = candidate
+            return chosen
+    endings = ", ".join(ending for candidate in formats.values() for ending in candidate.ENDINGS)
     raise InputError(f"{path}: expected a file name ending in one of {endings}")
 
 
@@ -62,19 +62,19 @@ def write(record: Record, chosen: Format, path: str | os.PathLike[str], options:
     if writer is None:
         able = [
             ending
-            for part in FORMATS.all().values()
-            if part.WRITERS.keys() & {record.kind, ANY}
-            for ending in part.ENDINGS
+            for candidate in FORMATS.all().values()
+            if candidate.WRITERS.keys() & {record.kind, ANY}
+            for ending in candidate.ENDINGS
         ]
         raise InputError(
             f"{record.file}: {_named(record.kind)} cannot go to {Path(path).suffix}; it can to {', '.join(able)}"
         )
-    taken = list(inspect.signature(writer).parameters)[2:]
+    accepted = list(inspect.signature(writer).parameters)[2:]
     for name in options:
-        if name not in taken:
-            known = ", ".join(f"--{_flag(each)}" for each in taken) or "none"
+        if name not in accepted:
+            listed = ", ".join(f"--{_flag(option)}" for option in accepted) or "none"
             raise InputError(
-                f"--{_flag(name)}: is no option of {_named(record.kind)} in {Path(path).suffix}, which has {known}"
+                f"--{_flag(name)}: is no option of {_named(record.kind)} in {Path(path).suffix}, which has {listed}"
             )
     with decoding(record.source) if isinstance(record.source, str | os.PathLike) else nullcontext():
         return tuple(writer(record, Path(path), **options) or ())

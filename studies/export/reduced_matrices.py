@@ -65,9 +65,9 @@ def _model_in(record: Record, coordinates: str | None) -> ReducedModel:
 
 def _lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> tuple[str, ...]:
     """Return a warning where the digits of a text file change the natural frequencies of the model in it."""
-    found = read_matrices(file)
+    matrices = read_matrices(file)
     rows = dict(zip(model.interface, plain_matrices(model)["selection"], strict=True))
-    again, _ = external_model(found[names["mass"]], found[names["stiffness"]], rows, damping_ratio=0.0)
+    again, _ = external_model(matrices[names["mass"]], matrices[names["stiffness"]], rows, damping_ratio=0.0)
     frequencies = model.natural_frequencies_hz[model.rigid_modes :]
     change = np.abs(again.natural_frequencies_hz[model.rigid_modes :] / frequencies - 1.0).max(initial=0.0)
     if change <= _NOTABLE:

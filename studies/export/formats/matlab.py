@@ -47,16 +47,16 @@ def write(record: Record, path: Path) -> None:
         elif values.size <= _MOST_CELLS:
             data[name] = _texts(values)
         else:
-            words, places = np.unique(values.astype(str), return_inverse=True)
-            data[name] = 1.0 + places.reshape(values.shape)
+            words, codes = np.unique(values.astype(str), return_inverse=True)
+            data[name] = 1.0 + codes.reshape(values.shape)
             data[f"{name}_names"] = _texts(words)
     data |= {
         "units": _struct({name: item.units for name, item in record.variables.items()}),
         "dimensions": {_name(name): cells for name, cells in dimensions.items()},
     }
     scene = record.attributes.get("scene") or _scene_of(record.attributes.get("provenance"))
-    taken = {_name(name): value for name, value in _unique(record.attributes.items())}
-    data["about"] = _struct({name: value for name, value in taken.items() if name != "scene"})
+    attributes = {_name(name): value for name, value in _unique(record.attributes.items())}
+    data["about"] = _struct({name: value for name, value in attributes.items() if name != "scene"})
     if scene is not None:
         data["scene"] = _struct(scene)
     with replacing(path) as temporary:
@@ -87,8 +87,8 @@ def _scene_of(provenance: Any) -> Any:
 def _texts(values: np.ndarray) -> np.ndarray:
     """Return texts as MATLAB has them: cells."""
     cells = np.empty(values.shape, dtype=object)
-    for place, text in np.ndenumerate(values):
-        cells[place] = str(text)
+    for index, text in np.ndenumerate(values):
+        cells[index] = str(text)
     return cells
 
 
@@ -117,15 +117,15 @@ def _cells(items: list[Any]) -> np.ndarray:
 
 def _unique(items: Iterable[tuple[str, Any]]) -> Iterable[tuple[str, Any]]:
     """Yield items under names that MATLAB takes, each once."""
-    seen: set[str] = set()
+    used: set[str] = set()
     for name, value in items:
-        short = own = _name(name)
+        short = unique = _name(name)
         number = 2
-        while own in seen:
-            own = f"{short[: _MOST_LETTERS - 4]}_{number}"
+        while unique in used:
+            unique = f"{short[: _MOST_LETTERS - 4]}_{number}"
             number += 1
-        seen.add(own)
-        yield own, value
+        used.add(unique)
+        yield unique, value
 
 
 def _name(text: str) -> str:

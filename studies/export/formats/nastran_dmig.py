@@ -30,13 +30,13 @@ def _write(path: Path, model: ReducedModel, matrices: Mapping[str, np.ndarray]) 
 
     size = len(matrices["mass"])
     points = MultiIndex.from_product([range(1, size + 1), [0]], names=["id", "dof"])
-    held = {key: name for key, name in _NAMES.items() if np.any(matrices[key])}
-    frames = {name: DataFrame(matrices[key], index=points, columns=points) for key, name in held.items()}
+    nonzero = {key: name for key, name in _NAMES.items() if np.any(matrices[key])}
+    frames = {name: DataFrame(matrices[key], index=points, columns=points) for key, name in nonzero.items()}
     with path.open("w", encoding="ascii", newline="\n") as stream:
         stream.write("$ reduced model of vanedamp\n")
         wtspoints(stream, np.arange(1, size + 1))
         wtdmig(stream, frames)
-    return {key: name.lower() for key, name in held.items()}
+    return {key: name.lower() for key, name in nonzero.items()}
 
 
 WRITERS = {"reduced-model": write}

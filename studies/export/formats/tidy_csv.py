@@ -43,9 +43,9 @@ def sweep(record: Record, path: Path, table: str | None = None) -> None:
     """
     axes: Sequence[str] = record.attributes["axes"]
     dims = tuple(axis.replace(".", "_") for axis in axes)
-    known = ("point", *(name for name in (_SECTION,) if any(name in item.dims for item in record.variables.values())))
-    if table is not None and table not in known:
-        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(known)}")
+    kinds = ("point", *(name for name in (_SECTION,) if any(name in item.dims for item in record.variables.values())))
+    if table is not None and table not in kinds:
+        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(kinds)}")
     rows = (*dims, _SECTION) if table == _SECTION else dims
     on_grid = {
         name: variable
@@ -55,12 +55,12 @@ def sweep(record: Record, path: Path, table: str | None = None) -> None:
     texts = [name for name in ("status", "classification") if name in on_grid]
     names = [*texts, *(name for name in on_grid if name not in texts)]
     columns = [column for name in names for column in _columns(record, name, len(rows))]
-    given = [(axis, record.variables[name]) for axis, name in zip(axes, dims, strict=True)]
+    coordinates = [(axis, record.variables[name]) for axis, name in zip(axes, dims, strict=True)]
     if rows != dims:
         count = np.shape(record.variables[names[0]].values)[len(dims)]
-        given.append((_SECTION, Variable(np.arange(1, count + 1))))
-    points = np.meshgrid(*(np.asarray(item.values) for _, item in given), indexing="ij")
-    names = [_headed(axis, item.units) for axis, item in given]
+        coordinates.append((_SECTION, Variable(np.arange(1, count + 1))))
+    points = np.meshgrid(*(np.asarray(item.values) for _, item in coordinates), indexing="ij")
+    names = [_headed(axis, item.units) for axis, item in coordinates]
     _write(path, [*zip(names, (values.ravel() for values in points), strict=True), *columns])
 
 
@@ -69,14 +69,14 @@ def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ..
 
     Fields, which would be too many columns, are left out. Raises InputError for rows that a result does not have.
     """
-    known = _lengths(record.variables)
-    if table is not None and table not in known:
-        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(known)}")
-    dimension = table or next(name for name in (*_TABLES.get(record.kind, ()), *known) if name in known)
-    own = [name for name, item in record.variables.items() if item.dims[:1] == (dimension,)]
-    own.sort(key=lambda name: (name != dimension, not name.endswith("time")))  # coordinate and times come first
-    fields = [name for name in own if math.prod(np.shape(record.variables[name].values)[1:]) > _MOST_COLUMNS]
-    columns = [column for name in own if name not in fields for column in _columns(record, name, 1)]
+    lengths = _lengths(record.variables)
+    if table is not None and table not in lengths:
+        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(lengths)}")
+    dimension = table or next(name for name in (*_TABLES.get(record.kind, ()), *lengths) if name in lengths)
+    names = [name for name, item in record.variables.items() if item.dims[:1] == (dimension,)]
+    names.sort(key=lambda name: (name != dimension, not name.endswith("time")))  # coordinate and times come first
+    fields = [name for name in names if math.prod(np.shape(record.variables[name].values)[1:]) > _MOST_COLUMNS]
+    columns = [column for name in names if name not in fields for column in _columns(record, name, 1)]
     _write(path, columns)
     return tuple(f"left out: {name}, a field; .mat or .vtkhdf hold it" for name in fields)
 
@@ -96,17 +96,17 @@ def _columns(record: Record, name: str, leading: int) -> list[Column]:
     rows, further = math.prod(values.shape[:leading]), values.shape[leading:]
     if not further:
         return [(_headed(name, variable.units), values.reshape(rows))]
-    places = list(np.ndindex(*further))
+    indices = list(np.ndindex(*further))
     units = variable.units.split(", ")
-    units = units if len(units) == len(places) else [variable.units] * len(places)
+    units = units if len(units) == len(indices) else [variable.units] * len(indices)
     labels = [
         ".".join(_label(record, dimension, index) for dimension, index in zip(variable.dims[leading:], at, strict=True))
-        for at in places
+        for at in indices
     ]
-    flat = values.reshape(rows, len(places))
+    flat = values.reshape(rows, len(indices))
     return [
-        (_headed(f"{name}.{label}", unit), flat[:, place])
-        for place, (label, unit) in enumerate(zip(labels, units, strict=True))
+        (_headed(f"{name}.{label}", unit), flat[:, column])
+        for column, (label, unit) in enumerate(zip(labels, units, strict=True))
     ]
 
 

@@ -56,20 +56,20 @@ def modes(record: Record, path: Path, mode: int | None = None, frames: int | Non
     and imaginary parts as fields, or animated as Re(shape exp(i phase)). Raises InputError for a mode that is not there
     and too few frames.
     """
-    found = modes_of(record)
+    mesh_modes = modes_of(record)
     if mode is None:
         if frames is not None:
             raise InputError("--frames: is for one mode; name it by --mode")
-        _check_size(len(found.names), len(found.mesh.points), "take one by --mode")
-        named = ((f"{name}: {hz:.6g} Hz", found.shape(k)) for k, (name, hz) in enumerate(found.rows))
-        _write(path, found.mesh, with_parts(named))
+        _check_size(len(mesh_modes.names), len(mesh_modes.mesh.points), "take one by --mode")
+        named = ((f"{name}: {hz:.6g} Hz", mesh_modes.shape(k)) for k, (name, hz) in enumerate(mesh_modes.rows))
+        _write(path, mesh_modes.mesh, with_parts(named))
         return
-    if not 1 <= mode <= len(found.names):
-        raise InputError(f"--mode: expected 1 to {len(found.names)}, not {mode}")
+    if not 1 <= mode <= len(mesh_modes.names):
+        raise InputError(f"--mode: expected 1 to {len(mesh_modes.names)}, not {mode}")
     steps = 24 if frames is None else frames
     if steps < 2:
         raise InputError(f"--frames: expected at least 2, not {steps}")
-    mesh, frequency, shape = found.mesh, found.frequencies_hz[mode - 1], found.shape(mode - 1)
+    mesh, frequency, shape = mesh_modes.mesh, mesh_modes.frequencies_hz[mode - 1], mesh_modes.shape(mode - 1)
     phases = 2.0 * np.pi * np.arange(steps) / steps
     times = phases / (2.0 * np.pi * frequency) if frequency > 0.0 else phases
     _write_steps(path, mesh, times, ((shape * np.exp(1j * phase)).real for phase in phases))
@@ -107,17 +107,17 @@ def response(record: Record, path: Path, mesh: str | Path | None = None, periods
     if model.recovery is None or model.coordinates is None:
         raise InputError(f"{structure.file}: holds no basis to recover displacements; run `vanedamp reduce --recovery`")
     coordinates, shapes = record.values("coordinates"), model.natural[1]
-    seen = record.values("displacement")
+    displacement = record.values("displacement")
     if coordinates.shape[1] != len(shapes) or _differ(
-        coordinates @ (model.row(str(scene.excitation.at)) @ shapes), seen
+        coordinates @ (model.row(str(scene.excitation.at)) @ shapes), displacement
     ):
         raise InputError(f"{structure.file}: is not the reduced model of the run any more; run the scene again")
     on = _mesh(read_record(mesh))
     if on.points.shape != model.coordinates.shape or _differ(on.points, np.asarray(model.coordinates)):
         raise InputError(f"--mesh {mesh}: is not the mesh of {structure.file}; take the modes of the same case")
     time = record.values("time")
-    each = round(1.0 / (record.attributes["frequency"] * (time[1] - time[0]))) if len(time) > 1 else 1
-    shown = range(max(len(time) - last * each, 0), len(time))
+    per_period = round(1.0 / (record.attributes["frequency"] * (time[1] - time[0]))) if len(time) > 1 else 1
+    shown = range(max(len(time) - last * per_period, 0), len(time))
     basis = model.recovery @ shapes
     _write_steps(path, on, time[shown], ((basis @ coordinates[step]).reshape(-1, 3) for step in shown))
     residual = model.residual_flexibility is not None
@@ -154,7 +154,7 @@ def modes_of(record: Record) -> ModesOnMesh:
         on = Mesh(ring.points, ring.cells, mesh.cell_type)
         return ModesOnMesh(on, waves.frequencies_hz, names, lambda mode: ring.shape(waves, mode))
     if "gyroscopic_frequency" in record.variables:
-        real, imaginary = (record.values(f"gyroscopic_shape_{part}") for part in ("real", "imaginary"))
+        real, imaginary = (record.values(f"gyroscopic_shape_{component}") for component in ("real", "imaginary"))
         frequencies, shapes, word = record.values("gyroscopic_frequency"), real + 1j * imaginary, "gyroscopic mode"
     else:
         frequencies, shapes, word = record.values("frequency"), record.values("shape"), "mode"
@@ -169,8 +169,8 @@ def _chosen(structure: Any, estimate: Mapping[str, Any] | None) -> Any:
     return replace(structure, modes=int(estimate["modes"]), natural=True, attached=bool(estimate["attached"]))
 
 
-def _differ(values: np.ndarray, others: np.ndarray) -> bool:
-    return bool(np.abs(values - others).max(initial=0.0) > _SAME * np.abs(others).max(initial=0.0))
+def _differ(values: np.ndarray, reference: np.ndarray) -> bool:
+    return bool(np.abs(values - reference).max(initial=0.0) > _SAME * np.abs(reference).max(initial=0.0))
 
 
 def _mesh(record: Record) -> Mesh:
