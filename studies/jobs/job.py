@@ -85,8 +85,8 @@ class JobResult:
     @property
     def writers(self) -> dict[str, Write]:
         """What writes each file, by the option that names it."""
-        own: dict[str, Write] = {"output": self.record.save}
-        return own | dict(self.files)
+        writers: dict[str, Write] = {"output": self.record.save}
+        return writers | dict(self.files)
 
     def clear(self, checkpoint: Path | None) -> None:
         """Remove a checkpoint once the files are safe, unless the same command is to go on from it."""
@@ -110,9 +110,9 @@ class Job(ABC):
     PARALLEL: ClassVar[bool] = False
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Return the job of a command line and of what the command has read. Raises InputError."""
-        return cls(arguments.input, *given)
+        return cls(arguments.input, *inputs)
 
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any], path: Path, **options: Any) -> Self:
@@ -224,7 +224,7 @@ class StudyJob(Job):
         return self.scene.files
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Read the study."""
         return cls(arguments.input, cls.STUDY.load(arguments.input))
 

@@ -34,8 +34,8 @@ class OptimiseJob(StudyJob):
 
     def work(self, means: Means) -> JobResult:
         """Search."""
-        found = optimise(self.study, means.pool, means.report, means.provenance, means.checkpoint)
-        return JobResult(found, partial(_summary, found), found.sentence, warnings=self.study.doubts)
+        result = optimise(self.study, means.pool, means.report, means.provenance, means.checkpoint)
+        return JobResult(result, partial(_summary, result), result.sentence, warnings=self.study.doubts)
 
 
 def _summary(optimisation: Optimisation, seconds: float) -> Iterator[str]:

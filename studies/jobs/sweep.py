@@ -48,9 +48,9 @@ class SweepJob(SceneJob):
     PARALLEL: ClassVar[bool] = True
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Return the job of a scene, or of all samples of its ranges. Raises InputError."""
-        (scene,) = given
+        (scene,) = inputs
         if not scene.ranges:
             return cls(arguments.input, scene, arguments.peak, not arguments.no_moved_start)
         from vanedamp.studies.jobs.ensemble import EnsembleJob
@@ -123,8 +123,8 @@ class SweepJob(SceneJob):
         return JobResult(
             result, partial(_summary, result, judged, f"{points.size} points, {resumed} of them from the checkpoint"),
             sentence + (best[0] if best else f"{result.status.size} points"), notes, new, files,
-            {"points_resumed": resumed, "headlines": [each.to_json() for each in responses],
-             "designs": [each.to_json() for each in judged]},
+            {"points_resumed": resumed, "headlines": [response.to_json() for response in responses],
+             "designs": [design.to_json() for design in judged]},
             points.size - resumed,
         )  # fmt: skip
 
@@ -139,7 +139,7 @@ def peak(points: Grid, result: Sweep, path: str) -> tuple[str, dict[str, Write]]
     mean = np.where(result.status == "ok", result.amplitude_mean_dynamic, -np.inf)
     directions = points.axes.get("continuation.direction", ())
     if directions:
-        linked = [place for place, direction in enumerate(directions) if direction != "independent"]
+        linked = [position for position, direction in enumerate(directions) if direction != "independent"]
         np.moveaxis(mean, list(points.axes).index("continuation.direction"), 0)[linked] = -np.inf
     index = int(np.argmax(mean))
     if not np.isfinite(mean.flat[index]):
@@ -151,9 +151,9 @@ def peak(points: Grid, result: Sweep, path: str) -> tuple[str, dict[str, Write]]
             chosen.scene, events=True, samples_per_period=PEAK_SAMPLES, start=chosen.start, progress=report
         )  # fmt: skip
     response = replace(response, advice=chosen.advice)
-    made = {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()}
+    provenance = {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()}
     at = ", ".join(f"{axis} = {format_value(value)}" for axis, value in values.items())
-    return f"--peak: {path} is the run at {at}", {"peak": lambda file: response.save(file, made)}
+    return f"--peak: {path} is the run at {at}", {"peak": lambda file: response.save(file, provenance)}
 
 
 def _summary(result: Sweep, judged: Sequence[Design], size: str, seconds: float) -> Iterator[str]:
