@@ -57,12 +57,12 @@ def kind(name: str) -> Kind | None:
 
 def of_command(command: str) -> Kind | None:
     """Return the kind that a command writes; None where there is none."""
-    return kind(command) or next((one for one in map(_loaded, names()) if command in one.COMMANDS), None)
+    return kind(command) or next((entry for entry in map(_loaded, names()) if command in entry.COMMANDS), None)
 
 
 def _loaded(name: str) -> Kind:
-    found: Kind = import_module(f"{__name__}.{name.replace('-', '_')}")
-    return found
+    module: Kind = import_module(f"{__name__}.{name.replace('-', '_')}")
+    return module
 
 
 #: a kind that has the underscore in its name; a folder that is no kind of HDF5

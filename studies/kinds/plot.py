@@ -43,12 +43,12 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
 
 
 def _of_file(path: str | Path) -> go.Figure:
-    found = collect([path])
-    if len(found.files) > 1:
+    collected = collect([path])
+    if len(collected.files) > 1:
         raise InputError(f"{path}: holds several results; name one file")
-    ((kind, results),) = ((kind, results) for kind, results in found.kinds.items() if results)
+    ((kind, results),) = ((kind, results) for kind, results in collected.kinds.items() if results)
     (entry,) = results.values()
-    with decoding(*found.records):
+    with decoding(*collected.records):
         return _drawn(kind, entry.record, str(path))
 
 

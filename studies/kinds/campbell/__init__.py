@@ -23,7 +23,7 @@ def facts(record: Found) -> Iterator[Fact]:
         of["mode"], of["frequency"], strict=True)]  # fmt: skip
     yield Fact("frequencies", ends, "Hz")
     crossings = zip(of["crossing_mode"], of["crossing_order"], of["crossing_speed"] * 30 / np.pi, strict=True)
-    found = [f"mode {mode + 1} and order {order:g} at {speed:.6g} rpm" for mode, order, speed in crossings]
-    yield Fact("crossings", found)
+    texts = [f"mode {mode + 1} and order {order:g} at {speed:.6g} rpm" for mode, order, speed in crossings]
+    yield Fact("crossings", texts)
     yield Fact("veerings", int((of["approach_kind"] == "veering").sum()))
     yield Fact("error", float(of["error"].max()), "", "estimated, relative, of the frequencies")

@@ -29,7 +29,7 @@ def amplification_figure(study: MistuningStudy) -> go.Figure:
         fit = study.fit(index)
         if fit is not None:
             figure.add_scatter(
-                x=[fit.quantile(each) for each in _FITTED], y=_FITTED, mode="lines", showlegend=False,
+                x=[fit.quantile(level) for level in _FITTED], y=_FITTED, mode="lines", showlegend=False,
                 line={"color": colour, "width": 1.3}, hoverinfo="skip", **look,
             )  # fmt: skip
     highest = float(study.amplification.max())

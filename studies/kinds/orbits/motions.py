@@ -53,10 +53,10 @@ def add_planes(figure: go.Figure, history: OrbitHistory, row: int, col: int) -> 
     planes = [("structure", history.displacement)]
     if history.slip.shape[1]:
         planes.append(("in the cavity", history.slip))
-    for place, (what, values) in enumerate(planes, start=col):
+    for panel, (what, values) in enumerate(planes, start=col):
         reach = 1.06e6 * np.abs(values).max(initial=1e-12)  # bodies move from wall to wall: show the frame apart
-        figure.update_xaxes(title_text=f"{what}, µm", range=[-reach, reach], row=row, col=place)
-        figure.update_yaxes(title={"text": "mm/s", "font_size": 12, "standoff": 2}, row=row, col=place)
+        figure.update_xaxes(title_text=f"{what}, µm", range=[-reach, reach], row=row, col=panel)
+        figure.update_yaxes(title={"text": "mm/s", "font_size": 12, "standoff": 2}, row=row, col=panel)
 
 
 def add_starts(figure: go.Figure, states: Sequence[np.ndarray], name: str, row: int, col: int, size: int) -> None:
@@ -137,6 +137,6 @@ def phase_figure(response: Response) -> go.Figure:
     states = (response.section[late, 0], response.section[late, 1], response.slip[late], response.slip_velocity[late])
     add_starts(figure, states, "starts of periods", row=1, col=1, size=5)
     for col, values in enumerate(((history.displacement, states[0]), (history.slip, states[2]))[:columns], start=1):
-        reach = 1.06e6 * max(1e-12, *(np.abs(each).max(initial=0.0) for each in values))
+        reach = 1.06e6 * max(1e-12, *(np.abs(array).max(initial=0.0) for array in values))
         figure.update_xaxes(range=[-reach, reach], row=1, col=col)
     return dressed(figure, height=430).update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})

@@ -32,7 +32,7 @@ def shown(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
     """Return charts and peaks of the runs of a file."""
     sweeps = page.results.kinds["sweep"]
     beside = sweeps_beside(ramp.scene, ramp.table.path, sweeps, "amplitude_mean_dynamic")
-    named = {page.names[other]: points for other, points in beside.items()}
+    named = {page.names[path]: points for path, points in beside.items()}
     rows = [
         {"name": run_name(ramp, run), "run": run, "share": ramp.share(run), "at": run.at_peak("frequency")}
         for run in ramp.runs
@@ -86,9 +86,9 @@ def figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = Map
                 line={"color": _STATIONARY, "dash": dash, "width": 1.6}, hovertemplate="%{x:.6g}: %{y:.5g} µm",
             )  # fmt: skip
     for run in ramp.runs:
-        kept = _thinned(run)
+        drawn = _thinned(run)
         figure.add_scatter(
-            x=getattr(run, x)[kept], y=1e6 * run.amplitude_dynamic[kept], name=run_name(ramp, run), mode="lines",
+            x=getattr(run, x)[drawn], y=1e6 * run.amplitude_dynamic[drawn], name=run_name(ramp, run), mode="lines",
             line={
                 "color": COLOURS[rates.index(abs(run.rate)) % len(COLOURS)], "width": 1.8,
                 "dash": "solid" if run.rate > 0.0 else "dash",
@@ -109,28 +109,28 @@ def figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = Map
 
 def menu(ramp: Ramp) -> go.Figure | None:
     """Draw one quantity of the periods at a time, which a menu chooses; None for files of earlier versions."""
-    shown = [one for name in ramp.quantities if not (one := table()[name]).dims]
+    shown = [quantity for name in ramp.quantities if not (quantity := table()[name]).dims]
     if not shown or not any(len(run.time) for run in ramp.runs):
         return None
     figure, x = go.Figure(), along(ramp)
-    for one in shown:
+    for quantity in shown:
         for number, run in enumerate(ramp.runs):
-            kept = _thinned(run)
-            values = run.quantities.get(one.name, np.full(len(run.time), np.nan))
+            drawn = _thinned(run)
+            values = run.quantities.get(quantity.name, np.full(len(run.time), np.nan))
             figure.add_scatter(
-                x=getattr(run, x)[kept], y=values[kept], name=run_name(ramp, run), mode="lines",
-                visible=one is shown[0], line={"color": COLOURS[number % len(COLOURS)], "width": 1.6},
+                x=getattr(run, x)[drawn], y=values[drawn], name=run_name(ramp, run), mode="lines",
+                visible=quantity is shown[0], line={"color": COLOURS[number % len(COLOURS)], "width": 1.6},
                 hovertemplate="%{x:.6g}: %{y:.5g}",
             )  # fmt: skip
     choices = [
         {
-            "label": one.name, "method": "update",
+            "label": quantity.name, "method": "update",
             "args": [
-                {"visible": [each is one for each in shown for _ in ramp.runs]},
-                {"yaxis.title.text": f"{one.name}, {one.unit}"},
+                {"visible": [candidate is quantity for candidate in shown for _ in ramp.runs]},
+                {"yaxis.title.text": f"{quantity.name}, {quantity.unit}"},
             ],
         }
-        for one in shown
+        for quantity in shown
     ]  # fmt: skip
     figure.update_layout(updatemenus=[{"buttons": choices, "x": 0.0, "xanchor": "left", "y": 1.2, "yanchor": "top"}])
     figure.update_xaxes(title_text=_TITLES[x], hoverformat=".6g")
@@ -143,9 +143,9 @@ def _measured_table(ramp: Ramp) -> Table:
     names = [name for name in ramp.quantities if not table()[name].dims]
     rows: list[list[float]] = []
     for run in ramp.runs:
-        nothing, kept = np.full(len(run.time), np.nan), _thinned(run)
+        nothing, drawn = np.full(len(run.time), np.nan), _thinned(run)
         columns = [run.time, *(run.quantities.get(name, nothing) for name in names)]
-        rows += ([run.rate, *values] for values in np.column_stack([c[kept] for c in columns]).tolist())
+        rows += ([run.rate, *values] for values in np.column_stack([c[drawn] for c in columns]).tolist())
     return ["rate", "time", *names], rows
 
 
@@ -163,9 +163,9 @@ def _ramp_table(ramp: Ramp) -> Table:
     stuck = [f"stuck_{body + 1}" for body in range(len(ramp.scene.damper))]
     rows: list[list[float]] = []
     for run in ramp.runs:
-        kept = _thinned(run)
+        drawn = _thinned(run)
         columns = (run.time, run.frequency, run.speed, run.amplitude_dynamic, run.impacts, *run.stuck.T.astype(float))
-        rows += ([run.rate, *values] for values in np.column_stack([c[kept] for c in columns]).tolist())
+        rows += ([run.rate, *values] for values in np.column_stack([c[drawn] for c in columns]).tolist())
     return ["rate", "time", "frequency", "speed", "amplitude", "impacts", *stuck], rows
 
 

@@ -65,7 +65,7 @@ def shown(file: str, history: History, page: Page) -> dict[str, Any]:
         measures = history.measures
         figure = impacts_figure(history.by_place, max(measures["periods"] - measures["transient"], 1))
         shown["impacts"] = page.chart("impacts", figure, HEADER, impacts_rows(history.by_place), [file])
-        shown["lost"] = sum(each.loss for each in history.by_place)
+        shown["lost"] = sum(site.loss for site in history.by_place)
     return shown
 
 
@@ -81,34 +81,34 @@ def _bodies(measures: Mapping[str, Any]) -> list[dict[str, float]]:
 
 def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure:
     """Draw impacts per period, mean normal and tangential impulse, and energy taken per period, one bar per contact."""
-    known = bool(np.isfinite([each.loss for each in impacts]).all())
-    figure = make_subplots(rows=2 + known, cols=1, shared_xaxes=True, vertical_spacing=0.05)
-    for body in dict.fromkeys(each.body for each in impacts):
-        mine = [each for each in impacts if each.body == body]
-        places, count = [each.place for each in mine], np.array([each.impacts for each in mine])
+    has_loss = bool(np.isfinite([site.loss for site in impacts]).all())
+    figure = make_subplots(rows=2 + has_loss, cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    for body in dict.fromkeys(site.body for site in impacts):
+        of_body = [site for site in impacts if site.body == body]
+        names, count = [site.place for site in of_body], np.array([site.impacts for site in of_body])
         colour, name = COLOURS[body % len(COLOURS)], f"body {body + 1}"
-        normal = 1e3 * np.array([each.normal_impulse for each in mine]) / count
-        tangential = 1e3 * np.array([each.tangential_impulse for each in mine]) / count
+        normal = 1e3 * np.array([site.normal_impulse for site in of_body]) / count
+        tangential = 1e3 * np.array([site.tangential_impulse for site in of_body]) / count
         bars = [(1, count / periods, "impacts per period", "", 1.0), (2, normal, "normal impulse", " mN s", 1.0)]
         bars += [(2, tangential, "tangential impulse", " mN s", 0.4)]
-        if known:
-            loss = 1e6 * np.array([each.loss for each in mine]) / periods
+        if has_loss:
+            loss = 1e6 * np.array([site.loss for site in of_body]) / periods
             bars += [(3, loss, "energy per period", " µJ", 1.0)]
         for row, values, title, unit, opacity in bars:
             figure.add_bar(
-                x=places, y=values, marker={"color": colour, "opacity": opacity}, showlegend=row == 1,
+                x=names, y=values, marker={"color": colour, "opacity": opacity}, showlegend=row == 1,
                 name=name, legendgroup=name, offsetgroup=f"{body}{opacity}" if row == 2 else f"{body}",
                 hovertemplate=f"{name}, {title}: %{{y:.4g}}{unit}<extra></extra>", row=row, col=1,
             )  # fmt: skip
     figure.update_xaxes(categoryorder="array", categoryarray=places_in_order(impacts))
     figure.update_yaxes(title_text="impacts per period", row=1, col=1)
     figure.update_yaxes(title_text="mean impulse, mN s", row=2, col=1)
-    if known:
+    if has_loss:
         figure.update_yaxes(title_text="energy per period, µJ", row=3, col=1)
-    dressed(figure, height=240 * (2 + known))
+    dressed(figure, height=240 * (2 + has_loss))
     return figure.update_layout(barmode="group", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})
 
 
 def impacts_rows(impacts: Sequence[ImpactsAtPlace]) -> Iterator[tuple[object, ...]]:
     """Yield a line a contact, bodies counted from 1, sums over the evaluated periods in SI units."""
-    yield from ((each.body + 1, *astuple(each)[1:]) for each in impacts)
+    yield from ((site.body + 1, *astuple(site)[1:]) for site in impacts)

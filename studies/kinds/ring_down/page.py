@@ -125,11 +125,11 @@ def _dots(colour: str, shown: str) -> dict[str, Any]:
 
 
 def _add_bins(figure: go.Figure, record: RingDown, name: str, colour: str, col: int) -> None:
-    found = record.bins[name]
+    means = record.bins[name]
     figure.add_scatter(
-        x=1e6 * np.sqrt(found.low * found.high), y=found.mean, mode="lines+markers", row=2, col=col,
+        x=1e6 * np.sqrt(means.low * means.high), y=means.mean, mode="lines+markers", row=2, col=col,
         name="means with 95 % confidence", legendgroup="bins", showlegend=name == "frequency",
-        error_y={"array": np.nan_to_num(found.confidence), "color": colour}, line={"color": colour, "width": 1.6},
+        error_y={"array": np.nan_to_num(means.confidence), "color": colour}, line={"color": colour, "width": 1.6},
         marker={"color": "#ffffff", "size": 8, "line": {"color": colour, "width": 2}},
         hovertemplate="mean, %{x:.5g} µm: %{y:.8g}<extra></extra>",
     )  # fmt: skip

@@ -72,7 +72,7 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     of every mode the diameter and the shape on sector 0 at these nodes over its largest displacement, as whole numbers.
     """
     points, named = 1e3 * ring.points, Interference(modes)
-    nodes, place = np.unique(ring.node, return_inverse=True)
+    nodes, node_index = np.unique(ring.node, return_inverse=True)
     shapes = modes.shapes.reshape(len(modes.shapes), -1, 3)[:, nodes]
     largest = np.sqrt((np.abs(shapes) ** 2).sum(axis=2)).max(axis=1)
     relative = np.stack([shapes.real, shapes.imag], axis=-1) / largest[:, None, None, None]
@@ -89,19 +89,19 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     return figure.update_layout(meta={
         "mode": mode, "scale": scale, "sectors": modes.sectors, "diameters": modes.diameters.tolist(),
         "families": modes.families.tolist(), "frequencies": modes.frequencies_hz.tolist(),
-        "names": [named.name(place) for place in range(len(modes))],
+        "names": [named.name(index) for index in range(len(modes))],
         "turns": turns(modes.axis, modes.sectors).reshape(-1, 9).tolist(), "rest": _packed(points, "<f4"),
-        "sector": _packed(ring.sector, "<u2"), "node": _packed(place, "<u4"),
+        "sector": _packed(ring.sector, "<u2"), "node": _packed(node_index, "<u4"),
         "shapes": _packed(np.rint(_STEPS * relative), "<i2"), "steps": _STEPS,
     })  # fmt: skip
 
 
 def sector_table(modes: RingModes, ring: WholeRing, mode: int) -> Table:
     """Return x, y, z (m) of the surface's nodes in sector 0, and real and imaginary part of a mode's shape there."""
-    own = ring.sector == 0
-    shape = modes.shapes[mode].reshape(-1, 3)[ring.node[own]]
-    header = [*"xyz", *(f"d{axis} {part}" for part in ("real", "imaginary") for axis in "xyz")]
-    return header, np.column_stack([ring.points[own], shape.real, shape.imag]).tolist()
+    in_sector = ring.sector == 0
+    shape = modes.shapes[mode].reshape(-1, 3)[ring.node[in_sector]]
+    header = [*"xyz", *(f"d{axis} {component}" for component in ("real", "imaginary") for axis in "xyz")]
+    return header, np.column_stack([ring.points[in_sector], shape.real, shape.imag]).tolist()
 
 
 def _packed(values: np.ndarray, dtype: str) -> str:

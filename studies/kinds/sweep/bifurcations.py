@@ -51,31 +51,31 @@ def diagram_panels(sweep: Sweep) -> list[Panel]:
     axis, units, paths = diagram_axis(sweep), sweep.units(), list(sweep.axes)
     assert axis is not None
     order = np.argsort(sweep.axes[axis], kind="stable")
-    others, found = [path for path in paths if path != axis], []
+    other_paths, panels = [path for path in paths if path != axis], []
     quantities = {"structure": sweep.sections["section_displacement"]}
     slip = sweep.sections.get("section_slip")
     for body in range(0 if slip is None else slip.shape[-1]):
         quantities[f"body {body + 1} in its cavity"] = slip[..., body]
-    for values in itertools.product(*(range(len(sweep.axes[path])) for path in others)):
-        at = dict(zip(others, values, strict=True))
-        place = tuple(order if path == axis else at[path] for path in paths)
-        ok = (sweep.status[place] == "ok")[:, None]
+    for values in itertools.product(*(range(len(sweep.axes[path])) for path in other_paths)):
+        at = dict(zip(other_paths, values, strict=True))
+        point = tuple(order if path == axis else at[path] for path in paths)
+        ok = (sweep.status[point] == "ok")[:, None]
         name = ", ".join(setting(path, sweep.axes[path][index], units[path]) for path, index in at.items())
         exponents = [
-            sweep.exponents[key][place] if sweep.exponents else None for key in ("exponent", "exponent_confidence")
+            sweep.exponents[key][point] if sweep.exponents else None for key in ("exponent", "exponent_confidence")
         ]
-        sections = {name: np.where(ok, values[place], np.nan) for name, values in quantities.items()}
-        found.append(Panel(name, sweep.axes[axis][order], sections, _words(sweep, place), *exponents))
-    return found
+        sections = {name: np.where(ok, values[point], np.nan) for name, values in quantities.items()}
+        panels.append(Panel(name, sweep.axes[axis][order], sections, _words(sweep, point), *exponents))
+    return panels
 
 
-def _words(sweep: Sweep, place: tuple[np.ndarray | int, ...]) -> np.ndarray:
+def _words(sweep: Sweep, point: tuple[np.ndarray | int, ...]) -> np.ndarray:
     """Return the motions at some points: by their exponents, or else by their classification."""
     if sweep.exponents:
-        return np.asarray(sweep.exponents["motion"][place])
-    kinds = (str(kind).partition("-")[0] for kind in sweep.classification[place])
-    known = {"periodic": "periodic", "non": "non-periodic"}
-    return np.array([known.get(kind, "without impacts") for kind in kinds], object)
+        return np.asarray(sweep.exponents["motion"][point])
+    kinds = (str(kind).partition("-")[0] for kind in sweep.classification[point])
+    words = {"periodic": "periodic", "non": "non-periodic"}
+    return np.array([words.get(kind, "without impacts") for kind in kinds], object)
 
 
 def bifurcation_figure(sweep: Sweep) -> go.Figure:
@@ -128,11 +128,11 @@ def _clouds(panel: Panel, most: int) -> Iterator[tuple[str, str, np.ndarray, np.
     for quantity, values in panel.sections.items():
         values = values[:, -max(1, most // len(values)) :]
         for word in dict.fromkeys(panel.motion):
-            own = np.flatnonzero(panel.motion == word)
-            x, y = np.repeat(panel.x[own], values.shape[1]), values[own].ravel()
-            known = np.isfinite(y)
-            if known.any():
-                yield quantity, word, x[known], y[known]
+            rows = np.flatnonzero(panel.motion == word)
+            x, y = np.repeat(panel.x[rows], values.shape[1]), values[rows].ravel()
+            finite = np.isfinite(y)
+            if finite.any():
+                yield quantity, word, x[finite], y[finite]
 
 
 def _menu(figure: go.Figure, quantities: list[str]) -> dict[str, object]:
@@ -156,8 +156,8 @@ def bifurcation_header(sweep: Sweep) -> tuple[str, ...]:
 def bifurcation_rows(sweep: Sweep) -> Iterator[list[object]]:
     """Yield a line per section of every point of the panels drawn, in SI units."""
     for panel in diagram_panels(sweep)[:MOST_PANELS]:
-        known = panel.exponent is not None and panel.confidence is not None
+        has_exponent = panel.exponent is not None and panel.confidence is not None
         stacked = np.stack(list(panel.sections.values()), axis=-1)
         for i, x in enumerate(panel.x.tolist()):
-            more = [panel.motion[i], *([panel.exponent[i], panel.confidence[i]] if known else ["", ""])]  # type: ignore[index]
+            more = [panel.motion[i], *([panel.exponent[i], panel.confidence[i]] if has_exponent else ["", ""])]  # type: ignore[index]
             yield from ([panel.name, x, s, *values, *more] for s, values in enumerate(stacked[i].tolist()))

@@ -117,7 +117,7 @@ def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
 def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], page: Page) -> dict[str, Any]:
     """Return charts and table of the responses along one axis, best design first; a study's keep their order."""
     every = len(responses)
-    places = {response.name: place for place, response in enumerate(responses)}
+    positions = {response.name: position for position, response in enumerate(responses)}
     if page.study is None:
         responses = best_first(responses)[:_MOST_CURVES]
     shown = [response.name for response in responses[: every if page.study is not None else _DRAWN]]
@@ -140,12 +140,12 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
         {
             "name": response.name, "headline": response.headline, "shown": response.name in shown, "colour": colour,
             "impacts": max(response.impacts_per_period[np.isfinite(response.damped_mean)], default=math.nan),
-            "place": places[response.name],
+            "place": positions[response.name],
         }
         for response, colour in zip(responses, cycle(len(responses)), strict=True)
     ]  # fmt: skip
     return charts | {
-        "axis": axis, "units": responses[0].units, "onset_of": max((each.onset_of for each in responses), key=len),
+        "axis": axis, "units": responses[0].units, "onset_of": max((curve.onset_of for curve in responses), key=len),
         "rows": rows, "every": every, "panels": len(panels),
         "picks": len(rows) > 1,
     }  # fmt: skip
