@@ -68,7 +68,7 @@ class _Expected:
 
     def after(self, done: int) -> Callable[[int, int], None]:
         """Return the progress of runs that follow those done."""
-        return lambda own, _: self(done + own)
+        return lambda more, _: self(done + more)
 
     def at(self, asked: int, before: Moment[Found] | None, now: Moment[Found], steps: Steps) -> None:
         """Expect the runs from a moment on, with those asked for so far and the moment before.
@@ -79,10 +79,10 @@ class _Expected:
         end, step = table.hours, 0.0 if table.steps is None else table.hours / table.steps
         if before is not None:
             step = now.time - before.time
-            left = now.found.reduction + now.found.reduction_confidence - self._study.threshold
+            margin = now.found.reduction + now.found.reduction_confidence - self._study.threshold
             falls = (before.found.reduction - now.found.reduction) / step
-            if falls > 0.0 and left > 0.0 and now.time + left / falls < end:
-                end = now.time + left / falls
+            if falls > 0.0 and margin > 0.0 and now.time + margin / falls < end:
+                end = now.time + margin / falls
                 halved = max(math.ceil(math.log2(step / (_CLOSE * table.hours))), 0)
         evaluations = len(STAGES) * steps_left(now, end, step, steps) + halved
         self.total = asked + evaluations * self._study.each + self._study.starts
@@ -109,8 +109,8 @@ class _Course:
         if np.any(self.wearing.lost(volume) >= 1.0):
             raise WornAway
         if self._new is not None:  # the first runs have told the contacts
-            found, self._new = self._new, None
-            return found
+            means, self._new = self._new, None
+            return means
         return self._runs.at(self.wearing.worn(volume))
 
     def scale(self, volume: np.ndarray) -> np.ndarray:
@@ -120,16 +120,16 @@ class _Course:
         """
         scale, wearing = np.full(len(volume), np.inf), self.wearing
         lost = wearing.lost(volume)
-        known = np.isfinite(lost)
+        finite = np.isfinite(lost)
         for size, matrix in (
             (wearing.gaps(volume), wearing.gap), (wearing.plays(volume), wearing.play),
-            (1.0 - lost[known], wearing.losses[known]),
+            (1.0 - lost[finite], wearing.losses[finite]),
         ):  # fmt: skip
             opens = matrix > 0.0
-            own = np.nan_to_num(size, nan=1.0)[:, None] / opens.sum(axis=1, keepdims=True).clip(1)
+            scaled = np.nan_to_num(size, nan=1.0)[:, None] / opens.sum(axis=1, keepdims=True).clip(1)
             scale = np.minimum(
                 scale,
-                np.divide(own, matrix, out=np.full(matrix.shape, np.inf), where=opens).min(axis=0, initial=np.inf),
+                np.divide(scaled, matrix, out=np.full(matrix.shape, np.inf), where=opens).min(axis=0, initial=np.inf),
             )
         return scale
 
@@ -155,8 +155,8 @@ def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[Found]]:
 
 def _worn_away(wearing: Wearing, last: Moment[Found]) -> tuple[float, int] | None:
     """Return when a body is worn away at the rates of the last moment, h, and its number; None: never, or not known."""
-    rate, left = wearing.losses @ last.found.rate, 1.0 - wearing.lost(last.state)
-    spans = np.divide(left, rate, out=np.full(len(left), np.inf), where=np.isfinite(left) & (rate > 0.0))
+    rate, remaining = wearing.losses @ last.found.rate, 1.0 - wearing.lost(last.state)
+    spans = np.divide(remaining, rate, out=np.full(len(remaining), np.inf), where=np.isfinite(remaining) & (rate > 0.0))
     first = int(np.argmin(spans))
     return (last.time + float(spans[first]), first) if np.isfinite(spans[first]) else None
 
@@ -170,7 +170,7 @@ def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Ite
 
     It is, too, where reductions differ by less than their confidence.
     """
-    table, first, last, found = course.study.table, before, after, list[Moment[Found]]()
+    table, first, last, moments = course.study.table, before, after, list[Moment[Found]]()
     while last.time - first.time > _CLOSE * table.hours:
         change = abs(last.found.reduction - first.found.reduction)
         if change < max(last.found.reduction_confidence, first.found.reduction_confidence):
@@ -178,9 +178,9 @@ def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Ite
         middle = (first.time + last.time) / 2
         volume, band = between(before, after, middle)
         moment = Moment(middle, volume, course.rates(volume), band, after.error)
-        found.append(moment)
+        moments.append(moment)
         first, last = (first, moment) if _passes(first, moment, course.study.threshold) else (moment, last)
-    yield from sorted(found, key=lambda moment: moment.time)
+    yield from sorted(moments, key=lambda moment: moment.time)
 
 
 def _record(
@@ -191,7 +191,7 @@ def _record(
     volume = np.array([moment.state for moment in moments])
     band, error = (np.array([getattr(moment, name) for moment in moments]) for name in ("band", "error"))
     rate, confidence = (np.array([getattr(m.found, name) for m in moments]) for name in ("rate", "confidence"))
-    area = np.array([one.area for one in runs.contacts])
+    area = np.array([contact.area for contact in runs.contacts])
     gap_rate = rate @ wearing.gap.T
     shift = np.sqrt(band**2 @ wearing.gap.T**2) + error @ wearing.gap.T
     travel = {
@@ -238,12 +238,12 @@ def _hours(
 
 def _lost(time: np.ndarray, above: np.ndarray) -> float | None:
     """Return the first time at which a curve that has been above zero falls below it."""
-    kept = np.flatnonzero(above >= 0.0)
-    if len(kept) == 0:
+    reached = np.flatnonzero(above >= 0.0)
+    if len(reached) == 0:
         return 0.0
-    below = np.flatnonzero(above[kept[0] :] < 0.0)
+    below = np.flatnonzero(above[reached[0] :] < 0.0)
     if len(below) == 0:
         return None
-    after = kept[0] + below[0]
-    part = above[after - 1] / (above[after - 1] - above[after])
-    return float(time[after - 1] + part * (time[after] - time[after - 1]))
+    after = reached[0] + below[0]
+    fraction = above[after - 1] / (above[after - 1] - above[after])
+    return float(time[after - 1] + fraction * (time[after] - time[after - 1]))

@@ -129,15 +129,15 @@ def _longest(now: Moment[Found], end: float, steps: Steps) -> float:
 
 def _step(rates: Callable[[np.ndarray], Found], now: Moment[Found], step: float) -> tuple[Moment[Found], np.ndarray]:
     """Return the moment after a step, and by how much its error exceeds the confidence of the rates (k,)."""
-    found = [now.found]
+    evaluated = [now.found]
     for weights in STAGES:
-        slope = sum(weight * one.rate for weight, one in zip(weights, found, strict=True))
+        slope = sum(weight * stage.rate for weight, stage in zip(weights, evaluated, strict=True))
         state = now.state + step * slope
-        found.append(rates(state))
-    rate, scatter = (np.array([getattr(one, name) for one in found]) for name in ("rate", "confidence"))
+        evaluated.append(rates(state))
+    rate, scatter = (np.array([getattr(stage, name) for stage in evaluated]) for name in ("rate", "confidence"))
     error = step * np.abs(_ERROR @ rate)
     excess = np.maximum(error - step * np.sqrt(_ERROR**2 @ scatter**2), 0.0)
     # what shifts the motion in time goes on with its rate, which solves the linearised equation
-    kept = np.divide(rate[-1], rate[0], out=np.ones(len(state)), where=rate[0] > 0.0)
-    band = np.sqrt((kept * now.band) ** 2 + step**2 * (_WEIGHTS**2 @ scatter[:-1] ** 2))
-    return Moment(now.time + step, state, found[-1], band, np.abs(kept) * now.error + excess), excess
+    ratio = np.divide(rate[-1], rate[0], out=np.ones(len(state)), where=rate[0] > 0.0)
+    band = np.sqrt((ratio * now.band) ** 2 + step**2 * (_WEIGHTS**2 @ scatter[:-1] ** 2))
+    return Moment(now.time + step, state, evaluated[-1], band, np.abs(ratio) * now.error + excess), excess

@@ -162,8 +162,8 @@ class LifeStudy(NamedTuple):
         Raises InputError for a contact that opens a gap and whose patch is not known.
         """
         scene = self.scene
-        gap, play = opening(scene, [(one.damper, one.side) for one in contacts])
-        area = np.array([one.area for one in contacts])
+        gap, play = opening(scene, [(contact.damper, contact.side) for contact in contacts])
+        area = np.array([contact.area for contact in contacts])
         for contact in np.flatnonzero(np.isnan(area) & np.any(gap + play > 0.0, axis=0)):
             damper, side, *_ = contacts[contact]
             extent = "height" if side in ALONG else "length"
@@ -176,8 +176,8 @@ class LifeStudy(NamedTuple):
 
     def points(self, scene: Scene, frequencies: Sequence[float]) -> list[Scene]:
         """Return a scene at some frequencies (f,), Hz."""
-        made = Points(scene)
-        return [made.scene(drive(scene, float(frequency))) for frequency in frequencies]
+        points = Points(scene)
+        return [points.scene(drive(scene, float(frequency))) for frequency in frequencies]
 
 
 class Wearing(NamedTuple):
@@ -202,13 +202,13 @@ class Wearing(NamedTuple):
     @property
     def losses(self) -> np.ndarray:
         """Fractions (bodies, c) of each body per volume of wear, 1/m^3; nan where its size is not known."""
-        found: np.ndarray = self.shares / body_volumes(self.scene)[:, None]
-        return found
+        fractions: np.ndarray = self.shares / body_volumes(self.scene)[:, None]
+        return fractions
 
     def lost(self, volume: np.ndarray) -> np.ndarray:
         """Return the fraction of each body that is worn away; nan where its size is not known."""
-        found: np.ndarray = self.losses @ volume
-        return found
+        fractions: np.ndarray = self.losses @ volume
+        return fractions
 
     def worn(self, volume: np.ndarray) -> Scene:
         """Return the scene with its gaps, plays and masses after some wear."""
