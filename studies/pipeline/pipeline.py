@@ -120,11 +120,11 @@ def _done(
     same = record.begin(stage.name, inputs)
     started = time.perf_counter()
     tools = Tools(lambda line: say(f"{stage.name}: {line}"), pool, not same, record.inputs(stage.name, stage.outputs))
-    found = stage.work(tools)
+    words = stage.work(tools)
     seconds = time.perf_counter() - started
     record.end(stage.name, inputs, stage.outputs)
-    say(f"{stage.name}: {found} ({seconds:.1f} s)")
-    return StageResult(stage.name, "done", reasons, outputs, found, seconds)
+    say(f"{stage.name}: {words} ({seconds:.1f} s)")
+    return StageResult(stage.name, "done", reasons, outputs, words, seconds)
 
 
 def _plan(listed: Sequence[Stage], record: PipelineRecord, say: Callable[[str], None]) -> list[StageResult]:
@@ -149,19 +149,19 @@ def _plan(listed: Sequence[Stage], record: PipelineRecord, say: Callable[[str], 
 def _check(listed: Sequence[Stage], files: Iterable[str | Path], source: Path, workers: int) -> None:
     """Reject bad input before anything runs, and results that would take the place of an input."""
     inputs = {(source.parent / file).resolve() if file != source else source.resolve() for file in files}
-    made: dict[Path, str] = {}
+    owners: dict[Path, str] = {}
     for stage in listed:
         with _located(stage):
             inputs |= {Path(file).resolve() for file in stage.check(workers)}
         for path in stage.outputs:
-            if path in made:
+            if path in owners:
                 raise InputError(
-                    f"{source}: {made[path]} and {stage.name} both write {path.name}; give one of them another name"
+                    f"{source}: {owners[path]} and {stage.name} both write {path.name}; give one of them another name"
                 )
-            made[path] = stage.name
-    taken = {path for stage in listed for path in stage.takes}
-    for path, name in made.items():
-        if path in inputs - taken:
+            owners[path] = stage.name
+    intermediate = {path for stage in listed for path in stage.takes}
+    for path, name in owners.items():
+        if path in inputs - intermediate:
             raise InputError(f"{source}: {name} writes {path.name}, which is an input; give another folder or name")
 
 

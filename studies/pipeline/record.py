@@ -38,8 +38,8 @@ class PipelineRecord:
             if data["kind"] != _KIND:
                 raise ValueError(f"kind {data['kind']}")
             self._begun = dict(data["begun"])
-            self._done = {name: {key: dict(made[key]) for key in ("inputs", "outputs")}
-                          for name, made in data["done"].items()}  # fmt: skip
+            self._done = {name: {key: dict(entry[key]) for key in ("inputs", "outputs")}
+                          for name, entry in data["done"].items()}  # fmt: skip
 
     def reasons(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> list[str]:
         """Return why a stage must run; nothing if its results match these inputs."""
@@ -55,16 +55,16 @@ class PipelineRecord:
 
     def edited(self, name: str, outputs: Sequence[Path]) -> list[Path]:
         """Return the outputs of a stage that are not as it made them, of those that it has made."""
-        made = self._done.get(name, {"outputs": {}})["outputs"]
-        return [path for path in outputs if made.get(path.name) and path.exists() and digest(path) != made[path.name]]
+        sums = self._done.get(name, {"outputs": {}})["outputs"]
+        return [path for path in outputs if sums.get(path.name) and path.exists() and digest(path) != sums[path.name]]
 
     def begin(self, name: str, inputs: Inputs) -> bool:
         """Note that a stage begins. Returns whether what an earlier start left is of the same inputs, or unknown."""
         mine = plain(inputs)
-        same = self._begun.get(name, mine) == mine
+        matches = self._begun.get(name, mine) == mine
         self._begun[name] = mine
         self._write()
-        return same
+        return matches
 
     def end(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> None:
         """Note that a stage has made its outputs."""
@@ -113,15 +113,15 @@ def leaves(data: Any, path: str = "") -> dict[str, Any]:
     }
 
 
-def _lost(made: Mapping[str, str | None], outputs: Sequence[Path]) -> Iterator[str]:
+def _lost(digests: Mapping[str, str | None], outputs: Sequence[Path]) -> Iterator[str]:
     """Yield which outputs are not as they were made; a digest of None: the stage had none to write."""
     for path in outputs:
-        if path.name not in made:
+        if path.name not in digests:
             yield f"{path.name} is new"
         elif not path.exists():
-            if made[path.name] is not None:
+            if digests[path.name] is not None:
                 yield f"{path.name} is missing"
-        elif digest(path) != made[path.name]:
+        elif digest(path) != digests[path.name]:
             yield f"{path.name} is not as it was made"
 
 

@@ -145,8 +145,8 @@ class CaseStage(Stage):
         tables.pop("campbell", None)
         if self.CALIBRATION_KEYS is not None:
             case, measured = replace(case, calibration=None), tables.pop("calibration", {})
-            kept = {key: measured[key] for key in self.CALIBRATION_KEYS if key in measured}
-            tables |= {"calibration": kept} if self.CALIBRATION_KEYS else {}
+            calibration = {key: measured[key] for key in self.CALIBRATION_KEYS if key in measured}
+            tables |= {"calibration": calibration} if self.CALIBRATION_KEYS else {}
         return {f"case {self.file.name}": tables} | _digests(case.files, self.file.parent) | _software(*_DOLFINX)
 
 
@@ -175,8 +175,8 @@ class Modal(CaseStage):
         from vanedamp.studies.case.stages import assemble, modal_analysis, set_level
 
         case, now = Case.load(self.file), plain(self.inputs())
-        same = tools.made_of is not None and _without_level(tools.made_of) == _without_level(now)
-        if same and (level := set_level(self.outputs[0], case)) is not None:
+        same_modes = tools.made_of is not None and _without_level(tools.made_of) == _without_level(now)
+        if same_modes and (level := set_level(self.outputs[0], case)) is not None:
             tools.warn(level_warnings(level.to_json()))
             return "modes kept, only the amplitude at the fatigue strength is new"
         analysis = modal_analysis(assemble(case))
@@ -270,13 +270,13 @@ class OnScene(Stage):
             return []
         kind = self._class()
         scene = kind.FILE.of(self._tables(_ANY_RIGID, 1e-6), self.file)
-        made = {path.resolve() for path in self.takes}
-        if self.table.structure is None and not made:
+        products = {path.resolve() for path in self.takes}
+        if self.table.structure is None and not products:
             check_model(scene)
         # a study measures its model, which may be made later
-        if issubclass(kind, SceneJob) or (self.table.structure is None and not made):
+        if issubclass(kind, SceneJob) or (self.table.structure is None and not products):
             self._job(_ANY_RIGID, 1e-6).check(workers)
-        return [self.file, *(file for file in scene.files if Path(file).resolve() not in made)]
+        return [self.file, *(file for file in scene.files if Path(file).resolve() not in products)]
 
     def inputs(self) -> dict[str, Any]:
         """Return the scene, its changes by the pipeline, and the files that it names."""
@@ -287,14 +287,14 @@ class OnScene(Stage):
         for table in {*_OF_JOBS.values()} - {_OF_JOBS.get(self.kind)}:
             tables.pop(table, None)
         options = [key for key in ("structure", "level", "peak") if hasattr(self.table, key)]
-        given: dict[str, Any] = {"option": {key: getattr(self.table, key) for key in options}}
+        changes: dict[str, Any] = {"option": {key: getattr(self.table, key) for key in options}}
         if self.table.structure == "rigid":
-            given["rigid model"] = rigid
+            changes["rigid model"] = rigid
         if self.table.level is not None:
-            given["fatigue level"] = {"amplitude": amplitude}
+            changes["fatigue level"] = {"amplitude": amplitude}
         there = (rigid or self.table.structure != "rigid") and (amplitude is not None or self.table.level is None)
         files = self._class().FILE.of(self._tables(rigid, amplitude), self.file).files if there else []
-        return {f"scene {self.file.name}": tables} | given | _digests(files, self.file.parent) | _software()
+        return {f"scene {self.file.name}": tables} | changes | _digests(files, self.file.parent) | _software()
 
     def work(self, tools: Tools) -> str:
         """Run it."""
@@ -305,8 +305,8 @@ class OnScene(Stage):
 
     def _class(self) -> type[SceneJob | StudyJob]:
         module, _, name = JOBS[self.kind].partition(":")
-        found: type[SceneJob | StudyJob] = getattr(import_module(f"vanedamp.studies.jobs.{module}"), name)
-        return found
+        job_class: type[SceneJob | StudyJob] = getattr(import_module(f"vanedamp.studies.jobs.{module}"), name)
+        return job_class
 
     def _job(self, rigid: dict[str, Any], amplitude: float | None) -> SceneJob | StudyJob:
         """Return the job on the structure and at the level that the pipeline gives."""
@@ -330,8 +330,8 @@ class OnScene(Stage):
             raise InputError("structure, excitation: expected tables, headed [structure] and [excitation]")
         if self.table.structure is not None:
             model, replaced = _MODELS[self.table.structure]
-            own = structure if structure.get("model") == model else {}
-            tables["structure"] = {"model": model} | {key: own[key] for key in own if key not in replaced}
+            base = structure if structure.get("model") == model else {}
+            tables["structure"] = {"model": model} | {key: base[key] for key in base if key not in replaced}
         if self.table.level is not None:
             tables["excitation"] = {key: excitation[key] for key in excitation if key not in _LEVELS}
         return tables
@@ -386,18 +386,18 @@ def _without_level(inputs: Inputs, strengths: bool = False) -> dict[str, Any]:
 
     strengths: keep the strengths and fatigue data of materials.
     """
-    found = copy.deepcopy(dict(inputs))
-    for tables in (data for subject, data in found.items() if subject.startswith("case ")):
+    remaining = copy.deepcopy(dict(inputs))
+    for tables in (data for subject, data in remaining.items() if subject.startswith("case ")):
         tables.pop("calibration", None)
         if not strengths and "material" in tables:
             tables["material"] = without_strengths(tables["material"])
-    return found
+    return remaining
 
 
 def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage]:
     """Yield the stages of a pipeline file with results in a folder, each after those that it takes from."""
     base, folder = source.resolve().parent, folder.resolve()
-    made: list[Path] = []
+    results: list[Path] = []
     case, tuned = (base / (pipeline.case or "")).resolve(), tuple[Path, ...]()
     products: dict[str, Path] = {}
     if pipeline.calibrate is not None:
@@ -405,28 +405,28 @@ def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage
         yield Calibrate("calibrate", case, files, ())
         products["rigid"] = files[0]
         case, tuned = files[1], files[1:2]
-        made.append(files[0])
+        results.append(files[0])
     if pipeline.modal is not None:
         yield Modal("modal", case, (folder / MODES,), tuned)
         products.setdefault("rigid", folder / MODES)
-        made.append(folder / MODES)
+        results.append(folder / MODES)
     if pipeline.reduce is not None:
         yield Reduce("reduce", case, (folder / REDUCED,), tuned, pipeline.reduce)
         products["reduced"] = folder / REDUCED
-        made.append(folder / REDUCED)
-    for one in pipeline.identify:
-        files = (folder / f"{one.stem}.h5", folder / one.scene)
-        yield Identify(f"identify {one.stem}", (base / one.study).resolve(), files, (), one)
-        made.append(files[0])
+        results.append(folder / REDUCED)
+    for identified in pipeline.identify:
+        files = (folder / f"{identified.stem}.h5", folder / identified.scene)
+        yield Identify(f"identify {identified.stem}", (base / identified.study).resolve(), files, (), identified)
+        results.append(files[0])
     for kind in JOBS:
         for table in getattr(pipeline, kind):
             stage = _on_scene(kind, table, base, folder, products, pipeline)
             yield stage
-            made += stage.outputs
+            results += stage.outputs
     if pipeline.report is not None:
         further = tuple(base / name for name in pipeline.report.results)
         page = folder / pipeline.report.file
-        yield Report("report", page, (page,), tuple(made), further, pipeline.report.title)
+        yield Report("report", page, (page,), tuple(results), further, pipeline.report.title)
 
 
 def _on_scene(
@@ -458,8 +458,8 @@ def _digests(files: Iterable[str | Path], folder: Path) -> dict[str, str]:
 
 def _software(*packages: str) -> dict[str, Any]:
     """Return the versions of the software that the numbers of a stage depend on."""
-    found = versions()
+    installed = versions()
     for package in packages:
         with suppress(importlib.metadata.PackageNotFoundError):
-            found[package] = importlib.metadata.version(package)
-    return {"version": found}
+            installed[package] = importlib.metadata.version(package)
+    return {"version": installed}
