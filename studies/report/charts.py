@@ -74,6 +74,6 @@ def axis_title(path: str, units: str, hertz: float = math.nan) -> str:
     if path == "excitation.frequency":
         return "excitation frequency, Hz"
     if path in SPEEDS:
-        known = f" (along the engine order {hertz:.5g} Hz a {units})" if math.isfinite(hertz) else ""
-        return f"speed of rotation, {units}{known}"
+        along_order = f" (along the engine order {hertz:.5g} Hz a {units})" if math.isfinite(hertz) else ""
+        return f"speed of rotation, {units}{along_order}"
     return f"{path}, {units}".removesuffix(", 1")

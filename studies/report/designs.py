@@ -48,8 +48,8 @@ class Design:
             paths = dict.fromkeys(path for curve in self.curves for path in curve.settings if not is_choice(path))
             over = f" ({', '.join(paths)})" if paths else ""
             remarks.append(f"this is the worst of {len(self.curves)} curves of the design{over}")
-        ratio, own = (f"{curve.headline.maximum_ratio:.3f}" for curve in (self.largest, self.worst))
-        if ratio != own:
+        ratio, worst = (f"{curve.headline.maximum_ratio:.3f}" for curve in (self.largest, self.worst))
+        if ratio != worst:
             remarks.append(f"the largest amplitude is {ratio}, of {self.largest.name}")
         return remarks if self.starts > 1 else [*remarks, "one start only"]
 
@@ -71,9 +71,9 @@ def designs(responses: Iterable[ForcedResponse]) -> list[Design]:
     """
     curves = list(responses)
     heights = np.array([curve.headline.peak_ratio for curve in curves])
-    known = np.array([curve.peak_known for curve in curves])
-    judged = ranked([curve.design for curve in curves], heights, known, known)
-    return [Design(tuple(curves[place] for place in places)) for places in judged]
+    certain = np.array([curve.peak_known for curve in curves])
+    judged = ranked([curve.design for curve in curves], heights, certain, certain)
+    return [Design(tuple(curves[index] for index in indices)) for indices in judged]
 
 
 def best_first(responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:

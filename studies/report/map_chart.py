@@ -104,19 +104,19 @@ def panels(
     paths, units = list(axes), sweep.units()
     across, up = (paths.index(path) for path in two)
     order = [np.argsort(axes[path], kind="stable") for path in two]
-    others = [index for index in range(len(paths)) if index not in (across, up)]
-    found = []
-    for combination in itertools.product(*(range(values.shape[index]) for index in others)):
+    other_axes = [index for index in range(len(paths)) if index not in (across, up)]
+    results = []
+    for combination in itertools.product(*(range(values.shape[index]) for index in other_axes)):
         point: list[int | slice] = [slice(None)] * len(paths)
-        for index, value in zip(others, combination, strict=True):
+        for index, value in zip(other_axes, combination, strict=True):
             point[index] = value
         cut = values[tuple(point)]
         cut = (cut if up < across else cut.T)[np.ix_(order[1], order[0])]
         name = ", ".join(
-            setting(paths[i], axes[paths[i]][j], units[paths[i]]) for i, j in zip(others, combination, strict=True)
+            setting(paths[i], axes[paths[i]][j], units[paths[i]]) for i, j in zip(other_axes, combination, strict=True)
         )
-        found.append((name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut))
-    return found
+        results.append((name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut))
+    return results
 
 
 def basin_axes(sweep: Sweep) -> tuple[str, str] | None:
@@ -163,24 +163,24 @@ def basin_panels(sweep: Sweep, states: SteadyStates) -> list[Panel]:
     names = np.full(sweep.shape, _NO_STATE, object)
     order = [list(sweep.axes).index(path) for path in (*states.parameters, *states.starts)]
     label, named = np.transpose(states.label, order), np.transpose(names, order)
-    for place, found in np.ndenumerate(states.states):
-        for number, name in enumerate(_names(found)):
-            named[place][label[place] == number] = name
+    for index, at_point in np.ndenumerate(states.states):
+        for number, name in enumerate(_names(at_point)):
+            named[index][label[index] == number] = name
     return panels(sweep, sweep.axes, names, basin_axes(sweep))
 
 
 def _names(states: Sequence[SteadyState]) -> list[str]:
     """Return the motions of states; a second one of a kind, of larger amplitude, has its number."""
     motions = [state.motion for state in states]
-    earlier = [motions[:place].count(motion) for place, motion in enumerate(motions)]
+    earlier = [motions[:number].count(motion) for number, motion in enumerate(motions)]
     return [f"{motion} ({count + 1})" if count else motion for motion, count in zip(motions, earlier, strict=True)]
 
 
 def _motions(states: SteadyStates) -> list[str]:
     """Return the name of runs that are not ok, then of all motions, by falling number of runs."""
     runs: Counter[str] = Counter()
-    for found in states.states.flat:
-        runs.update(dict(zip(_names(found), (state.runs for state in found), strict=True)))
+    for at_point in states.states.flat:
+        runs.update(dict(zip(_names(at_point), (state.runs for state in at_point), strict=True)))
     return [_NO_STATE, *(name for name, _ in runs.most_common())]
 
 
@@ -200,9 +200,9 @@ def count_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
 def state_rows(sweep: Sweep, states: SteadyStates) -> Iterator[list[object]]:
     """Yield values of the parameters, number of the state from 1, and the state's results."""
     axes = [sweep.axes[path].tolist() for path in states.parameters]
-    for place, found in np.ndenumerate(states.states):
-        at = [values[index] for values, index in zip(axes, place, strict=True)]
-        yield from ([*at, number, *state] for number, state in enumerate(found, start=1))
+    for point, at_point in np.ndenumerate(states.states):
+        at = [values[index] for values, index in zip(axes, point, strict=True)]
+        yield from ([*at, number, *state] for number, state in enumerate(at_point, start=1))
 
 
 def _steps(shades: Sequence[str]) -> list[list[object]]:

@@ -123,7 +123,7 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
         figure.add_trace(deformed_mesh(*deformed(points, shape), triangles, visible=index == mode))
     names = [f"mode {index + 1}: {values['frequency'][index]:.2f} Hz" for index in chosen]
     menu = [
-        {"label": name, "method": "update", "args": [{"visible": [True, *(index == other for other in chosen)]}]}
+        {"label": name, "method": "update", "args": [{"visible": [True, *(index == shown for shown in chosen)]}]}
         for index, name in zip(chosen, names, strict=True)
     ]
     in_space(figure, viewpoint(points, shapes[list(chosen).index(mode)]))
@@ -163,13 +163,13 @@ def spots_figure(
         hovertemplate="%{intensity:.4g} MPa per µm<extra></extra>",
         lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
     ))  # fmt: skip
-    places = 1e3 * np.array([spot["coordinates"] for spot in spots.values()])
+    marks = 1e3 * np.array([spot["coordinates"] for spot in spots.values()])
     figure.add_scatter3d(
-        x=places[:, 0], y=places[:, 1], z=places[:, 2], mode="markers+text", text=list(spots), name="hot spots",
+        x=marks[:, 0], y=marks[:, 1], z=marks[:, 2], mode="markers+text", text=list(spots), name="hot spots",
         marker={"size": 6, "color": "#dc2626", "line": {"color": "#fff", "width": 1}}, textposition="top center",
         hovertemplate="%{text}: %{x:.2f}, %{y:.2f}, %{z:.2f} mm<extra></extra>",
     )  # fmt: skip
-    near = cKDTree(places).query(points)[0] < _NEAR * np.linalg.norm(np.ptp(points, axis=0))
+    near = cKDTree(marks).query(points)[0] < _NEAR * np.linalg.norm(np.ptp(points, axis=0))
     shape = values["shape"][mode].reshape(-1, 3)[of.nodes]
     return in_space(figure, viewpoint(points, np.where(near[:, None], shape, 0.0), (_ELEVATION, -_ELEVATION)))
 

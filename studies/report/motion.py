@@ -138,21 +138,21 @@ class Motion:
         """Return the data for the player of the page (motion.js), y downwards."""
         data = {
             "time": _short(self.time, 4), "each": self.each, "first": self.first,
-            "displacement": _short(1e6 * self.displacement, 3), "cavities": [_drawn(each) for each in self.cavities],
+            "displacement": _short(1e6 * self.displacement, 3), "cavities": [_drawn(item) for item in self.cavities],
         }  # fmt: skip
         return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
     def rows(self) -> Iterator[list[float]]:
         """Yield time (periods) and displacement, then along, lift and tilt of each body."""
         bodies = [body for cavity in self.cavities for body in cavity.bodies]
-        columns = [part for body in bodies for part in (body.along, body.lift, body.tilt)]
+        columns = [column for body in bodies for column in (body.along, body.lift, body.tilt)]
         yield from np.column_stack([self.time, self.displacement, *columns]).tolist()
 
     def header(self) -> list[str]:
         """Return the names of the columns of `rows`."""
         numbers = [body.number + 1 for cavity in self.cavities for body in cavity.bodies]
-        parts = [f"body_{number}_{part}" for number in numbers for part in ("along", "lift", "tilt")]
-        return ["period", "displacement", *parts]
+        names = [f"body_{number}_{quantity}" for number in numbers for quantity in ("along", "lift", "tilt")]
+        return ["period", "displacement", *names]
 
 
 def motion_of(
@@ -178,9 +178,9 @@ def motion_of(
     swing = min(factor, _rounded(_SWING * max(widths) / max(np.abs(plane.floor_along).max(), 1e-300)))
     draw = _Drawing(scene, plane, along[frames], forms, half, factor, swing, _WIDTH / max(widths))
     light = np.where(plane.contact_closed, CLOSED, OPEN)
-    for moment, place in impacts:
+    for moment, struck_contact in impacts:
         recent = (time >= moment) & (time < moment + _FLASH * period)
-        struck = np.array([other == place for other in plane.contacts])
+        struck = np.array([contact == struck_contact for contact in plane.contacts])
         light[recent[:, None] & struck] = HIT
     cavities = [draw.cavity(cavity, light) for cavity in scene.cavity if scene.bodies_in(cavity)]
     return Motion(
@@ -205,27 +205,27 @@ class _Drawing:
         """Draw a cavity and its bodies, which stand from left to right. light: (n, contacts)."""
         inside = self.scene.bodies_in(cavity)
         length = sum(2 * self.half[k][0] for k in inside)
-        bodies, places, ceiling, at = [], [], [], -length / 2
+        bodies, mids, ceiling, at = [], [], [], -length / 2
         for k in inside:
-            places.append(at + self.half[k][0])
-            bodies.append(self._body(k, places[-1]))
+            mids.append(at + self.half[k][0])
+            bodies.append(self._body(k, mids[-1]))
             at += 2 * self.half[k][0]
         highest = max(2 * self.half[k][1] for k in inside)
         if cavity.play is not None:
-            for k, place in zip(inside, places, strict=True):
+            for k, mid in zip(inside, mids, strict=True):
                 a, b = self.half[k]
                 heights = 2 * b + self.factor * (cavity.play + self._ceiling(cavity.play, k))
-                ceiling.append(CeilingPart((self.scale * (place - a), self.scale * (place + a)), self.scale * heights))
+                ceiling.append(CeilingPart((self.scale * (mid - a), self.scale * (mid + a)), self.scale * heights))
             highest += self.factor * cavity.play
         walls = [self._wall(cavity, inside, side, highest) for side in ("left", "right")]
         k = inside[0]
         rotation = self.plane.floor_rotation[:, k]
-        across = np.nan_to_num(self.plane.floor_across[:, k]) - rotation * places[0]
+        across = np.nan_to_num(self.plane.floor_across[:, k]) - rotation * mids[0]
         shift = self.swing * np.column_stack([self.scale * self.plane.floor_along[:, k], self.scale * across, rotation])
         contacts = [
-            ContactMotion(place, self._points(number, bodies), light[:, number])
-            for number, place in enumerate(self.plane.contacts)
-            if place[1] in (*SIDES, "body") and any(body.number == place[0] for body in bodies)
+            ContactMotion(contact, self._points(number, bodies), light[:, number])
+            for number, contact in enumerate(self.plane.contacts)
+            if contact[1] in (*SIDES, "body") and any(body.number == contact[0] for body in bodies)
         ]
         left, right = (
             self.scale * (sign * (length + self.factor * cavity.gap) / 2 + self.factor * wall)
@@ -237,10 +237,10 @@ class _Drawing:
         """Return along, lift and tilt (n,) of a body's centre in the frame of its floor."""
         return self.along[:, k], np.nan_to_num(self.plane.body_lift[:, k]), np.nan_to_num(self.plane.body_tilt[:, k])
 
-    def _body(self, k: int, place: float) -> BodyMotion:
+    def _body(self, k: int, mid: float) -> BodyMotion:
         along, lift, tilt = self._pose(k)
         a, b = self.half[k]
-        centre = np.column_stack([place + self.factor * along, b + self.factor * lift])
+        centre = np.column_stack([mid + self.factor * along, b + self.factor * lift])
         turn = self.factor * tilt[:, None]
         form, damper = self.forms[k], self.scene.damper[k]
         if form.rolls:
@@ -273,8 +273,8 @@ class _Drawing:
         for number, (body, at, corner) in enumerate(self.plane.contacts):
             if (body, at) == (k, side):
                 a, b = self._corners(k)[corner].tolist() if corner >= 0 else (0.0, 0.0)
-                place = lift + a * tilt if across else along - b * tilt
-                moved[a if across else b] = self.plane.contact_gap[:, number] - play + sign * place
+                position = lift + a * tilt if across else along - b * tilt
+                moved[a if across else b] = self.plane.contact_gap[:, number] - play + sign * position
         if not moved:
             return np.zeros((len(along), 2))
         low, high = min(moved), max(moved)
@@ -296,15 +296,15 @@ class _Drawing:
     def _points(self, number: int, bodies: list[BodyMotion]) -> np.ndarray:
         """Return the point of a body at which a contact acts (n, 2)."""
         k, side, corner = self.plane.contacts[number]
-        place = next(i for i, body in enumerate(bodies) if body.number == k)
-        body = bodies[place]
+        index = next(i for i, body in enumerate(bodies) if body.number == k)
+        body = bodies[index]
         centre = body.outline[:, 0] if body.round else body.outline.mean(axis=1)
         if corner >= 0:
             return body.outline[:, corner]
         if side != "body":
             return centre + np.array(_SIDES[side]) * body.half
-        heights = common_heights(body.face, bodies[place + 1].face) or (body.half[1],)
-        upper = sum(each == self.plane.contacts[number] for each in self.plane.contacts[:number])
+        heights = common_heights(body.face, bodies[index + 1].face) or (body.half[1],)
+        upper = sum(contact == self.plane.contacts[number] for contact in self.plane.contacts[:number])
         point = np.array([body.half[0], heights[upper] - body.half[1]])
         turn = self.factor * np.nan_to_num(body.tilt)[:, None] * (not body.round)
         return centre + _turned(turn, point[None])[:, 0]
@@ -326,8 +326,8 @@ def _forms(scene: Scene, plane: PlanarSamples) -> list[Shape]:
 def _half_extents(scene: Scene) -> list[tuple[float, float]]:
     """Return half length and half height of every body; those without any are drawn like the others."""
     extents = [damper.half_extent for damper in scene.damper]
-    known = [extent for extent in extents if extent[0] > 0.0]
-    a, b = np.mean(known, axis=0) if known else np.array([1.5, 1.0]) * max(cavity.gap for cavity in scene.cavity)
+    sized = [extent for extent in extents if extent[0] > 0.0]
+    a, b = np.mean(sized, axis=0) if sized else np.array([1.5, 1.0]) * max(cavity.gap for cavity in scene.cavity)
     return [extent if extent[0] > 0.0 else (float(a), float(b)) for extent in extents]
 
 

@@ -82,14 +82,14 @@ class Page:
         studies: list[tuple[Study | None, set[str]]] = [
             (result.record, set(self.results.parts(file))) for file, result in self.results.kinds[CLAIMS].items()
         ]
-        own = set(self.results.by_file).difference(*(files for _, files in studies))
+        unclaimed = set(self.results.by_file).difference(*(files for _, files in studies))
         blocks = []
         for kind, section in sorted(self.known.items(), key=lambda item: item[0] == CLAIMS):  # the claims come last
             if kind == CLAIMS:
                 blocks.append(self._common_sections())
             moves = {name: partial(self._put_off, name) for name in _COMMON}
             template = Path(getattr(section, "TEMPLATE", section.__file__)).with_suffix(".html")
-            for study, files in [(None, own), *studies]:
+            for study, files in [(None, unclaimed), *studies]:
                 results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
                 if results:
                     name, title, not_ok = (None, "", "") if study is None else (study.study, study.title, study.not_ok)
@@ -105,8 +105,8 @@ class Page:
 
     def _common_sections(self) -> str:
         """Return the pieces that were put off, below their headings."""
-        parts = ([f"<h2>{_COMMON[name]}</h2>", *pieces] for name, pieces in self.common.items() if pieces)
-        return "".join(itertools.chain.from_iterable(parts))
+        sections = ([f"<h2>{_COMMON[name]}</h2>", *pieces] for name, pieces in self.common.items() if pieces)
+        return "".join(itertools.chain.from_iterable(sections))
 
 
 def _shown(section: Section, results: Mapping[str, Result], page: Page) -> Any:
@@ -208,10 +208,10 @@ def _compared(scenes: Mapping[str, dict[str, str]]) -> dict[str, Any]:
     """Return what all scenes have in common, by key, and the keys in which they differ."""
     keys = dict.fromkeys(key for scene in scenes.values() for key in scene)
     values = {key: [scene.get(key, "") for scene in scenes.values()] for key in keys}
-    common = {key: same[0] for key, same in values.items() if len(set(same)) == 1}
+    common = {key: entries[0] for key, entries in values.items() if len(set(entries)) == 1}
     differing = [key for key in keys if key not in common]
-    own = {name: {key: scene[key] for key in differing if key in scene} for name, scene in scenes.items()}
-    return {"common": common, "differing": differing, "most_columns": _MOST_COLUMNS, "owners": _by_owners(own)}
+    different = {name: {key: scene[key] for key in differing if key in scene} for name, scene in scenes.items()}
+    return {"common": common, "differing": differing, "most_columns": _MOST_COLUMNS, "owners": _by_owners(different)}
 
 
 def _flat(data: Any, path: str = "") -> dict[str, str]:

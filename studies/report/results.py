@@ -95,23 +95,23 @@ class Results:
 
 def sections() -> dict[str, Section]:
     """Return the sections by the kind of result that they show, in the order of the page. Raises ExtensionError."""
-    known: dict[str, Section] = {}
+    by_kind: dict[str, Section] = {}
     for section in SECTIONS.all().values():
         kind = getattr(section, "KIND", None) or _folder(section).NAME
-        if kind in known:
-            files = f"{known[kind].__file__} and {section.__file__}"
+        if kind in by_kind:
+            files = f"{by_kind[kind].__file__} and {section.__file__}"
             raise ExtensionError(f"two sections of the report show results of the kind {kind}: {files}")
-        known[kind] = section
-    return known
+        by_kind[kind] = section
+    return by_kind
 
 
 def short_names(paths: Iterable[str]) -> dict[str, str]:
     """Return the shortest ends of paths that distinguish them: file names, with folders where names are the same."""
-    parts = {path: Path(path).resolve().parts for path in paths}
+    components = {path: Path(path).resolve().parts for path in paths}
     names = {}
-    for path, mine in parts.items():
+    for path, mine in components.items():
         length = 1
-        while any(other[-length:] == mine[-length:] for key, other in parts.items() if other != mine):
+        while any(other[-length:] == mine[-length:] for key, other in components.items() if other != mine):
             length += 1
         names[path] = "/".join(mine[-length:])
     return names
@@ -122,20 +122,20 @@ def collect(paths: Sequence[str | Path]) -> Results:
 
     Raises InputError for any other file, and when there is nothing to report.
     """
-    known = sections()
-    results = Results({kind: {} for kind in known})
+    by_kind = sections()
+    results = Results({kind: {} for kind in by_kind})
     for path in map(Path, paths):
         if not path.exists():
             raise InputError(f"{path}: no such file or folder")
-        for file in _candidates(path, known) if path.is_dir() else [path]:
-            kind = _kind(file, known)
-            if kind in known:
-                with contextlib.nullcontext() if kind in _endings(known) else decoding(file):
-                    results.kinds[kind][str(file)] = _loaded(known[kind], file)
+        for file in _candidates(path, by_kind) if path.is_dir() else [path]:
+            kind = _kind(file, by_kind)
+            if kind in by_kind:
+                with contextlib.nullcontext() if kind in _endings(by_kind) else decoding(file):
+                    results.kinds[kind][str(file)] = _loaded(by_kind[kind], file)
             elif not path.is_dir():
-                raise InputError(f"{file}: holds no result that a report shows ({', '.join(known)})")
+                raise InputError(f"{file}: holds no result that a report shows ({', '.join(by_kind)})")
     if not results.files:
-        raise InputError(f"{', '.join(map(str, paths))}: no results that a report shows ({', '.join(known)})")
+        raise InputError(f"{', '.join(map(str, paths))}: no results that a report shows ({', '.join(by_kind)})")
     return results
 
 

@@ -91,7 +91,7 @@ def ring_sentence(sweep: Sweep) -> str:
         return "no point is ok, and none has a largest sector"
     *point, sector = np.unravel_index(int(np.nanargmax(mean)), mean.shape)
     axes = zip(sweep.axes.items(), point, sweep.units().values(), strict=True)
-    where = ", ".join(setting(path, values[place], unit) for (path, values), place, unit in axes)
+    where = ", ".join(setting(path, values[index], unit) for (path, values), index, unit in axes)
     text = f"largest mean amplitude {1e6 * np.nanmax(mean):.4g} µm in sector {sector} of {mean.shape[-1]} at {where}"
     ratio, uneven = (float(sweep.sectors[name][tuple(point)]) for name in ("amplification", "localisation"))
     if np.isfinite(ratio):
@@ -119,8 +119,8 @@ def _panels(sweep: Sweep, across: str) -> list[Panel]:
 def _spread(impacts: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
     """Yield number, mean, least and most impacts per period of each sector, over points (k, N)."""
     for sector, values in enumerate(impacts.T):
-        known = values[np.isfinite(values)]
-        yield (sector, *((known.mean(), known.min(), known.max()) if known.size else (np.nan,) * 3))
+        finite = values[np.isfinite(values)]
+        yield (sector, *((finite.mean(), finite.min(), finite.max()) if finite.size else (np.nan,) * 3))
 
 
 def _impacts_figure(rows: Sequence[tuple[int, float, float, float]]) -> go.Figure:
@@ -145,16 +145,16 @@ def _seeds(sweep: Sweep) -> Iterator[dict[str, Any]]:
     if swept is not None:
         ratio = ratio.max(axis=paths.index(swept), keepdims=True)
     ratio = np.moveaxis(ratio, paths.index(_SEED), -1)
-    others = [path for path in paths if path not in (_SEED, swept)]
-    combinations = itertools.product(*(range(len(sweep.axes[path])) for path in others))
+    other_paths = [path for path in paths if path not in (_SEED, swept)]
+    combinations = itertools.product(*(range(len(sweep.axes[path])) for path in other_paths))
     for combination, values in zip(combinations, ratio.reshape(-1, ratio.shape[-1]), strict=True):
-        known = values[np.isfinite(values)]
-        if known.size:
-            named = zip(others, combination, strict=True)
-            name = ", ".join(setting(path, sweep.axes[path][place], units[path]) for path, place in named)
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            named = zip(other_paths, combination, strict=True)
+            name = ", ".join(setting(path, sweep.axes[path][index], units[path]) for path, index in named)
             yield {
                 "name": name,
-                "count": known.size,
-                "largest": known.max(),
-                "quantiles": [quantile(known, one) for one in _QUANTILES],
+                "count": finite.size,
+                "largest": finite.max(),
+                "quantiles": [quantile(finite, probability) for probability in _QUANTILES],
             }

@@ -31,13 +31,13 @@ def points_beside(
     if parameter not in paths:
         return np.zeros(0), np.zeros(0)
     mine, shown = system_of(scene, {}, parameter), np.zeros(sweep.shape, bool)
-    others = [index for index, path in enumerate(paths) if path != parameter and not is_start(path)]
-    for combination in itertools.product(*(range(sweep.shape[index]) for index in others)):
-        place: list[int | slice] = [slice(None)] * len(paths)
-        for index, value in zip(others, combination, strict=True):
-            place[index] = value
-        values = {paths[i]: sweep.axes[paths[i]].tolist()[j] for i, j in zip(others, combination, strict=True)}
-        shown[tuple(place)] = system_of(sweep.scene, values, parameter) == mine
+    other_axes = [index for index, path in enumerate(paths) if path != parameter and not is_start(path)]
+    for combination in itertools.product(*(range(sweep.shape[index]) for index in other_axes)):
+        point: list[int | slice] = [slice(None)] * len(paths)
+        for index, value in zip(other_axes, combination, strict=True):
+            point[index] = value
+        values = {paths[i]: sweep.axes[paths[i]].tolist()[j] for i, j in zip(other_axes, combination, strict=True)}
+        shown[tuple(point)] = system_of(sweep.scene, values, parameter) == mine
     shown &= sweep.status == "ok"
     along = np.meshgrid(*sweep.axes.values(), indexing="ij")[paths.index(parameter)]
     return along[shown], getattr(sweep, measure)[shown]
@@ -47,8 +47,8 @@ def sweeps_beside(
     scene: Scene, parameter: str, sweeps: Mapping[str, Result], measure: str = "amplitude_mean"
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return the points of `points_beside` by the files of the sweeps that have any."""
-    found = {file: points_beside(scene, parameter, result.record, measure) for file, result in sweeps.items()}
-    return {file: points for file, points in found.items() if len(points[0])}
+    by_file = {file: points_beside(scene, parameter, result.record, measure) for file, result in sweeps.items()}
+    return {file: points for file, points in by_file.items() if len(points[0])}
 
 
 def system_of(scene: Scene, values: Mapping[str, Any], parameter: str) -> dict[str, Any] | None:

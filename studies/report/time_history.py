@@ -95,10 +95,10 @@ class History:
     def late(self) -> History:
         """Return the last periods only, as many as a page carries."""
         begin = max(self.time[-1] - _MOST_PERIODS * self.period, self.time[-_MOST_SAMPLES:][0])
-        kept = self.time >= begin
-        plane = None if self.plane is None else self.plane.cut(kept)
+        shown = self.time >= begin
+        plane = None if self.plane is None else self.plane.cut(shown)
         return replace(
-            self, time=self.time[kept], displacement=self.displacement[kept], bodies=self.bodies[kept],
+            self, time=self.time[shown], displacement=self.displacement[shown], bodies=self.bodies[shown],
             plane=plane, hits=[hit for hit in self.hits if hit[0] >= begin],
         )  # fmt: skip
 
