@@ -58,8 +58,8 @@ class Band:
     @property
     def count(self) -> int:
         """Number of points of the band."""
-        given = getattr(self, self.key)
-        return given.num if isinstance(given, Range) else len(given)
+        points = getattr(self, self.key)
+        return points.num if isinstance(points, Range) else len(points)
 
     @property
     def values(self) -> np.ndarray:
@@ -93,8 +93,8 @@ def file_in(record: type[File], tables: Mapping[str, Any], table: str, missing: 
     data = dict(tables)
     if table not in data:
         raise InputError(f"{path}: {table}: missing; {missing}")
-    given = data[table]
-    if isinstance(given, dict) and not set(UNITS) & set(given):
+    entries = data[table]
+    if isinstance(entries, dict) and not set(UNITS) & set(entries):
         raise InputError(
             f"{path}: {table}.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
         )

@@ -46,11 +46,11 @@ class _Parser(argparse.ArgumentParser):
         from vanedamp.files.toml_input import nearest  # heavy, as is all that is not for --help
 
         if choice := re.search(r"(invalid choice: '?([^',\s]*)'?).*\(choose from (.*)\)", message):
-            known = re.findall(r"[^',\s]+", choice[3])
-            message = f"{message[: choice.end(1)]}; {nearest(choice[2], known)}"
+            choices = re.findall(r"[^',\s]+", choice[3])
+            message = f"{message[: choice.end(1)]}; {nearest(choice[2], choices)}"
         elif option := re.search(r"unrecognized arguments: (?:[^-]\S* )*(--?\w[\w-]*)", message):
-            known = [name for action in self._actions for name in action.option_strings]
-            message += f"; {nearest(option[1], known)}"
+            choices = [name for action in self._actions for name in action.option_strings]
+            message += f"; {nearest(option[1], choices)}"
         self.exit(BAD_INPUT, f"{self.prog}: {shortened(message)}; see {self.prog} --help\n")
 
 
@@ -209,12 +209,12 @@ def _parsers(name: str | None) -> tuple[_Parser, _Parser]:
         "forced responses with impacts."
     )  # fmt: skip
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
-    named, places = parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for other, command in commands.items():
+    named, subparsers = parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for command_name, command in commands.items():
         summary = command.SUMMARY
-        place = places.add_parser(other, help=summary, description=summary[0].upper() + summary[1:] + ".")
-        if other == name:
-            command.add_arguments(place)
-            place.set_defaults(run=command.run)
-            named = place
+        child = subparsers.add_parser(command_name, help=summary, description=summary[0].upper() + summary[1:] + ".")
+        if command_name == name:
+            command.add_arguments(child)
+            child.set_defaults(run=command.run)
+            named = child
     return parser, named

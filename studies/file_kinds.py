@@ -67,8 +67,8 @@ def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:
     for kind in KINDS.values():
         if not set(kind.tables).isdisjoint(tables):
             return kind
-    known = "; ".join(f"{a(kind)} has {', '.join(kind.tables)}" for kind in reversed(KINDS.values()))
-    raise InputError(f"{source}: no kind of input file has these keys; {known}")
+    choices = "; ".join(f"{a(kind)} has {', '.join(kind.tables)}" for kind in reversed(KINDS.values()))
+    raise InputError(f"{source}: no kind of input file has these keys; {choices}")
 
 
 def a(kind: FileKind) -> str:
@@ -93,10 +93,10 @@ def another_kind(path: str | Path, taken: Collection[str]) -> str:
         tables = read_toml(file)
         kind = kind_of(tables, str(path))
     except VanedampError:
-        known = file.suffix in _OTHERS and not file.name.endswith(".claims.json")
-        return f"is {_OTHERS[file.suffix]}" if known else ""
-    own = {table for name in taken if name in KINDS for table in KINDS[name].tables}
-    if ANY in taken or kind.name in taken or (not own.isdisjoint(tables) and kind.name not in _WITH_SCENE):
+        named = file.suffix in _OTHERS and not file.name.endswith(".claims.json")
+        return f"is {_OTHERS[file.suffix]}" if named else ""
+    accepted = {table for name in taken if name in KINDS for table in KINDS[name].tables}
+    if ANY in taken or kind.name in taken or (not accepted.isdisjoint(tables) and kind.name not in _WITH_SCENE):
         return ""
     shown = next((table for table in kind.tables if table in tables), "[sweep]")  # as a list
     return f"is {a(kind)} ([{shown}]): vanedamp {kind.command or kind.name} {path}"
@@ -104,5 +104,5 @@ def another_kind(path: str | Path, taken: Collection[str]) -> str:
 
 def expected(taken: Collection[str]) -> str:
     """Return the kinds that are taken, in words."""
-    others = {RESULT: "a result (HDF5)", ANY: "an input file (TOML)"}
-    return " or ".join(others.get(name) or f"{a(KINDS[name])} ([{KINDS[name].tables[0]}])" for name in taken)
+    general = {RESULT: "a result (HDF5)", ANY: "an input file (TOML)"}
+    return " or ".join(general.get(name) or f"{a(KINDS[name])} ([{KINDS[name].tables[0]}])" for name in taken)

@@ -32,13 +32,13 @@ class Forecast:
         if self._progress is None or kept:
             return
         unit = max(self._mean(next(iter(self._left))), 1e-9)
-        left = sum(count * self._mean(each) for each, count in self._left.items())
+        remaining = sum(count * self._mean(name) for name, count in self._left.items())
         done = round(sum(map(sum, self._seconds.values())) / unit)
-        self._progress(done, done + round(left / unit))
+        self._progress(done, done + round(remaining / unit))
 
     def _mean(self, kind: str) -> float:
         """Return the time of a part, s."""
-        taken, (of, cost) = self._seconds[kind], self._assumed[kind]
-        if taken:
-            return sum(taken) / len(taken)
+        seconds, (of, cost) = self._seconds[kind], self._assumed[kind]
+        if seconds:
+            return sum(seconds) / len(seconds)
         return cost * self._mean(of) if of != kind else 0.0

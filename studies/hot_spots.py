@@ -26,19 +26,19 @@ def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
         if "coordinates" in facts:
             line += _place(facts["coordinates"])
         line += f" in {facts['group']}" if facts.get("group") else ""
-        parts = []
+        texts = []
         mode, first = facts.get("mode", {}), facts.get("per_amplitude")
         if mode.get("number", 1) != 1:
-            told = f"mode {mode['number']} ({mode['frequency_hz']:.6g} Hz)"
-            parts.append(_of_amplitude(told, mode) if "at" in mode else f"{told}, which moves no interface coordinate")
+            word = f"mode {mode['number']} ({mode['frequency_hz']:.6g} Hz)"
+            texts.append(_of_amplitude(word, mode) if "at" in mode else f"{word}, which moves no interface coordinate")
         if first:
-            parts.append(_of_amplitude("first mode", first))
+            texts.append(_of_amplitude("first mode", first))
         for cause, values in facts.get("static", {}).items():
             unit, factor = _UNITS.get(cause, _MPA)
             stress, doubt = von_mises(np.array(values)), facts.get("static_error", {}).get(cause)
             error = plus_minus(doubt / stress if doubt is not None and stress else None)
-            parts.append(f"{cause} {stress * factor:.4g} {unit}{error}")
-        yield line + (": von Mises stress of " + ", ".join(parts) if parts else "")
+            texts.append(f"{cause} {stress * factor:.4g} {unit}{error}")
+        yield line + (": von Mises stress of " + ", ".join(texts) if texts else "")
 
 
 def spot_warnings(provenance: Mapping[str, Any]) -> Iterator[str]:
@@ -108,10 +108,10 @@ def _of_amplitude(mode: str, of: Mapping[str, Any]) -> str:
 
 def strength_lines(strengths: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     """Yield a line for each hot spot with the strength of a motion that happens now and then (strength.assessment)."""
-    for name, found in strengths.items():
-        line = f"{name}: {found['amplitude'] / 1e6:.4g} MPa, utilisation {found['utilisation']:.3g}"
+    for name, strength in strengths.items():
+        line = f"{name}: {strength['amplitude'] / 1e6:.4g} MPa, utilisation {strength['utilisation']:.3g}"
         for kind, of in (("life_starts", "starts"), ("life_repeats", "times")):
-            if kind in found:
-                line += f", damage {found['damage']:.3g}: median life {found[kind]['50%']:.3g} {of}"
+            if kind in strength:
+                line += f", damage {strength['damage']:.3g}: median life {strength[kind]['50%']:.3g} {of}"
                 break
         yield line

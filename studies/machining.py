@@ -16,9 +16,11 @@ def fine_gap(gap: float, half_width: float | None = None) -> str:
 
     half_width: None where no tolerance is named.
     """
-    found = [f"a gap of {1e6 * gap:.3g} um is below {1e6 * GAP:g} um"] if gap < GAP else []
+    reasons = [f"a gap of {1e6 * gap:.3g} um is below {1e6 * GAP:g} um"] if gap < GAP else []
     if half_width is not None and half_width < TOLERANCE:
-        found.append(f"a tolerance of +-{1e6 * half_width:.2g} um is below +-{1e6 * TOLERANCE:g} um")
+        reasons.append(f"a tolerance of +-{1e6 * half_width:.2g} um is below +-{1e6 * TOLERANCE:g} um")
     return (
-        f"{' and '.join(found)}, what {_BASIS} can hold; sort the parts by size, or take a larger gap" if found else ""
+        f"{' and '.join(reasons)}, what {_BASIS} can hold; sort the parts by size, or take a larger gap"
+        if reasons
+        else ""
     )

@@ -51,10 +51,10 @@ def whole_ring(modes: RingModes, coordinates: np.ndarray, cells: np.ndarray) -> 
     numbers[:, high] = np.roll(numbers[:, low], -1, axis=0)
     on_axis = low[low == high]
     numbers[:, on_axis] = on_axis
-    kept, places = np.unique(numbers, return_inverse=True)
-    sector, node = np.divmod(kept, count)
+    unique, inverse = np.unique(numbers, return_inverse=True)
+    sector, node = np.divmod(unique, count)
     points = np.einsum("sij,nj->sni", turns(modes.axis, sectors), coordinates - modes.point)[sector, node] + modes.point
-    return WholeRing(sector, node, points, places.reshape(sectors, count)[:, cells].reshape(-1, cells.shape[1]))
+    return WholeRing(sector, node, points, inverse.reshape(sectors, count)[:, cells].reshape(-1, cells.shape[1]))
 
 
 def with_parts(shapes: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:

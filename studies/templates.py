@@ -87,8 +87,8 @@ def _notes(rom: Path | None) -> dict[str, str]:
     if rom is None:
         return {"structure": _STRUCTURE_NOTE}
     level = ReducedModel.load(rom).provenance.get("fatigue")
-    told = _NO_STRENGTH if level is None else _AT_STRENGTH.format(**level) + plus_minus(level.get("error"))
-    return {"excitation": _LEVEL_NOTE.format(level=told), "contact": _CONTACT_NOTE}
+    level_text = _NO_STRENGTH if level is None else _AT_STRENGTH.format(**level) + plus_minus(level.get("error"))
+    return {"excitation": _LEVEL_NOTE.format(level=level_text), "contact": _CONTACT_NOTE}
 
 
 def _case(file: Path) -> Template:
@@ -124,16 +124,16 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
             "model": "rigid", "mass": _rounded(shipped.mass), "stiffness": _rounded(shipped.stiffness),
             "damping_ratio": shipped.damping_ratio,
         }  # fmt: skip
-        place: dict[str, Any] = {}
+        location: dict[str, Any] = {}
         cavities: list[dict[str, Any]] = [{"name": "c1"}]
         near = [shipped.frequency] * 2
     else:
         model = ReducedModel.load(rom)
-        structure, place, cavities, near = _on_model(model, rom)
+        structure, location, cavities, near = _on_model(model, rom)
         if (level := model.provenance.get("fatigue")) is not None:
-            place["at"], near = level["at"], [level["frequency_hz"]] * 2
+            location["at"], near = level["at"], [level["frequency_hz"]] * 2
             amplitude = _rounded(level["amplitude"], 2)
-    excitation = place | {"frequency": near[0], "resonance_amplitude": amplitude}
+    excitation = location | {"frequency": near[0], "resonance_amplitude": amplitude}
     moving: dict[str, Any] = {"structure": structure, "excitation": excitation | {"resonance_near": near}}
     moving["cavity"] = [cavity | {"gap": amplitude} for cavity in cavities]
     resonance = chosen_resonance(validate(Scene, moving, str(rom or file)))

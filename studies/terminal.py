@@ -140,9 +140,9 @@ class _Lines:
             return
         self.said = now
         rate = (done - self.first) / (now - self.started)
-        left = f", {rate:.3g} per second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
+        remaining = f", {rate:.3g} per second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
         stage = f", {self.stage}" if self.stage else ""
-        _print(f"{self.title}{stage}: {done} of {total}{left}")
+        _print(f"{self.title}{stage}: {done} of {total}{remaining}")
 
     def enter(self, title: str) -> str:
         """Name a stage in the lines that follow. Returns the one before."""
