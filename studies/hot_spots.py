@@ -61,7 +61,7 @@ def spot_warnings(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 
 def level_warnings(level: Mapping[str, Any] | None) -> Iterator[str]:
-    """Yield what to look at in the amplitude at the fatigue strength (studies.case.stages.Fatigue), if there is one."""
+    """Yield warnings on the amplitude at the fatigue strength (studies.case.stages.FatigueLevel); none without one."""
     if level is not None:
         yield from _doubts({_LEVEL: level})
         yield from _unmoved(level)

@@ -11,7 +11,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
-from vanedamp.studies.demo.figure_file import Structure
+from vanedamp.studies.demo.figure_file import FigureStructure
 from vanedamp.studies.hot_spots import plus_minus
 
 #: mass of the body over the structure's, and its gap over the amplitude without bodies
@@ -117,7 +117,7 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
 
     blocks: bodies are blocks where a reduced model has the motion and the size of their cavity; they take longer.
     """
-    shipped = Structure.shipped()
+    shipped = FigureStructure.shipped()
     amplitude = _rounded(shipped.amplitude, 2)
     if rom is None:
         structure = {

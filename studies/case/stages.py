@@ -176,7 +176,7 @@ def _direction(
 
 
 @dataclass(frozen=True)
-class Fatigue:
+class FatigueLevel:
     """The level at which the first bending's stress reaches a fraction of the fatigue strength.
 
     share      fraction of the strength
@@ -193,7 +193,7 @@ class Fatigue:
     moved: float
 
     @classmethod
-    def of(cls, case: Case, peaks: Sequence[PeakStress], moved: float) -> Fatigue | None:
+    def of(cls, case: Case, peaks: Sequence[PeakStress], moved: float) -> FatigueLevel | None:
         """Return the level of a case; None without a fatigue strength."""
         table, strengths = case.calibration or CalibrationTable(), case.strengths(peak.group for peak in peaks)
         if not strengths:
@@ -233,7 +233,7 @@ class ModalAnalysis:
     rigid: RigidModel | None
     cavities: dict[str, CavityMotion]
     functional: np.ndarray | None
-    fatigue: Fatigue | None
+    fatigue: FatigueLevel | None
     warnings: tuple[str, ...]
     wall_time_s: float
     gyroscopic: GyroscopicModes | None = None
@@ -303,7 +303,7 @@ class ModalAnalysis:
         self.modes.save(path, variables, attributes)
 
 
-def set_level(path: Path, case: Case) -> Fatigue | None:
+def set_level(path: Path, case: Case) -> FatigueLevel | None:
     """Write the fatigue level of a case into the file of its modes, and return it; None if that lacks stresses."""
     kind, variables, attributes = load_any(path)
     names = ("stress_per_amplitude", "stress_place", "volume", "stress_error", "stress_singular")
@@ -311,7 +311,7 @@ def set_level(path: Path, case: Case) -> Fatigue | None:
         return None
     moved = json.loads(attributes["fatigue"])["moved"]
     columns = (variables[name].values.tolist() for name in names)
-    level = Fatigue.of(case, [PeakStress(*entries) for entries in zip(*columns, strict=True)], moved)
+    level = FatigueLevel.of(case, [PeakStress(*entries) for entries in zip(*columns, strict=True)], moved)
     if level is not None:
         save(path, kind, variables, attributes | {"fatigue": level.to_json()})
     return level
@@ -351,7 +351,7 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     )  # fmt: skip
 
 
-def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.ndarray) -> Fatigue | None:
+def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.ndarray) -> FatigueLevel | None:
     """Return the fatigue level of a mode; None without a fatigue strength."""
     if structure.case.fatigue_strength is None:
         return None
@@ -360,7 +360,7 @@ def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.nd
         unit = shape / abs(float(functional @ shape))
         moved = 1.0 / float(np.linalg.norm(unit.reshape(-1, 3), axis=1).max())
         peaks = peak_stresses(structure.solid, unit, structure.matrices, excluded_places(structure))
-    return Fatigue.of(structure.case, peaks, moved)
+    return FatigueLevel.of(structure.case, peaks, moved)
 
 
 def strength_warnings(structure: Structure) -> tuple[str, ...]:

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.report.claims import Claim
 
-Curves = Mapping[str, list[Curve]]
+Curves = Mapping[str, list[DampedCurve]]
 #: reductions that differ by less are the same
 _SLACK = 0.02
 SHOWN, PARTLY, NOT_SHOWN = "shown", "partly", "not shown"
@@ -112,7 +112,7 @@ def fig12(curves: Curves) -> list[Claim]:
     ]
 
 
-def _level(reduced: Curve, rigid: Curve) -> Claim:
+def _level(reduced: DampedCurve, rigid: DampedCurve) -> Claim:
     top, rigid_top = reduced.peak(), rigid.peak()
     return claim(
         "The averaged amplitudes of both models agree, at about half of the maximum without bodies.",
@@ -125,7 +125,7 @@ def _level(reduced: Curve, rigid: Curve) -> Claim:
     )
 
 
-def onset(curve: Curve) -> Claim:
+def onset(curve: DampedCurve) -> Claim:
     onsets = [_onset(start, single) for start, single in curve.each or (("", curve),)]
     shown = [apart < 0.01 and points > 5 for _, apart, points in onsets]
     return claim(
@@ -139,7 +139,7 @@ def onset(curve: Curve) -> Claim:
     )
 
 
-def _onset(start: str, curve: Curve) -> tuple[str, float, int]:
+def _onset(start: str, curve: DampedCurve) -> tuple[str, float, int]:
     """Return an onset in words, and by how much the curves differ below it, over how many points."""
     below = curve.frequency < curve.onset
     of = f"{start}: " if start else ""
@@ -154,7 +154,7 @@ def _onset(start: str, curve: Curve) -> tuple[str, float, int]:
     )
 
 
-def drop(curve: Curve) -> Claim:
+def drop(curve: DampedCurve) -> Claim:
     above = (curve.frequency > curve.peak().frequency) & curve.touched
     ratio = curve.smooth[above] / curve.fixed[above]
     low, median, high = (float(np.quantile(ratio, share)) for share in (0.0, 0.5, 1.0))
@@ -172,7 +172,7 @@ def drop(curve: Curve) -> Claim:
     )
 
 
-def resonance_shift(curve: Curve) -> Claim:
+def resonance_shift(curve: DampedCurve) -> Claim:
     top, fixed, free = curve.peak(), curve.peak(curve.fixed), curve.peak(curve.undamped)
     attached = float(curve.attached[top.index])
     share = (free.frequency / fixed.frequency) ** 2 - 1  # the body's mass over the structure's, as its floor feels it
@@ -197,7 +197,7 @@ def resonance_shift(curve: Curve) -> Claim:
     )
 
 
-def _scatter(reduced: Curve, rigid: Curve) -> Claim:
+def _scatter(reduced: DampedCurve, rigid: DampedCurve) -> Claim:
     mine, other = reduced.scatter, rigid.scatter
     return claim(
         "Averages of the reduced model scatter less than maxima of the rigid model.",

@@ -16,7 +16,7 @@ from vanedamp.coupling.sweep.sweep import warm_up_engine
 from vanedamp.files.store import load
 from vanedamp.files.toml_output import write_commented
 from vanedamp.studies.demo import claims
-from vanedamp.studies.demo.figure_file import FOLDER, Effort, Structure
+from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureStructure
 from vanedamp.studies.demo.figure_study import MODES, FigureStudy, Read, Session, prepare, print_claims, study
 from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
@@ -85,7 +85,7 @@ def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> P
         # compiling the engine takes as long as the finite elements: side by side, and once for all workers
         compiled = pool.submit(warm_up_engine, "line")
         if rigid:
-            structure = Structure.shipped()
+            structure = FigureStructure.shipped()
         else:
             with _stage("mesh, modes, rigid model, reduced model"):
                 structure = prepare(folder)

@@ -34,7 +34,7 @@ _QUANTITY = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?) ([a-z_]+)")
 
 
 @dataclass(frozen=True)
-class Structure:
+class FigureStructure:
     """The units of a figure's quantities: the rigid model of the first bending, and its excitation.
 
     mass (kg), stiffness (N/m), damping_ratio, frequency (Hz) of the rigid model; amplitude (m) of its undamped
@@ -49,12 +49,12 @@ class Structure:
     rom: Path | None = None
 
     @classmethod
-    def shipped(cls) -> Structure:
+    def shipped(cls) -> FigureStructure:
         """Return the rigid model of the shipped cluster, which needs no finite elements."""
         return cls(**read_toml(FOLDER / "rigid_model.toml"))
 
     @classmethod
-    def load(cls, modes: Path, rom: Path) -> Structure:
+    def load(cls, modes: Path, rom: Path) -> FigureStructure:
         """Read the record that `vanedamp modal` wrote. Raises InputError without rigid model and fatigue strength."""
         _, attributes = load(modes, "modes")
         if "rigid" not in attributes or "fatigue" not in attributes:
@@ -121,7 +121,7 @@ class FigureScenes:
     scenes: dict[str, Scene]
 
     @classmethod
-    def load(cls, file: Path, structure: Structure, effort: Effort | None = None) -> Self:
+    def load(cls, file: Path, structure: FigureStructure, effort: Effort | None = None) -> Self:
         """Read a figure, on a structure. Raises InputError, naming the file."""
         data, scenes = read_toml(file), {}
         try:
@@ -193,7 +193,7 @@ def _damping_ratio(scene: Scene) -> float:
     return getattr(scene.structure, "damping_ratio", None) or 1e-3
 
 
-def _scaled(data: Any, structure: Structure) -> Any:
+def _scaled(data: Any, structure: FigureStructure) -> Any:
     """Return data with its quantities as numbers."""
     if isinstance(data, dict):
         return {key: _scaled(value, structure) for key, value in data.items()}

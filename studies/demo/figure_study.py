@@ -21,12 +21,12 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, finite, write_json
 from vanedamp.files.toml_output import schema_name, write_commented, write_schema
 from vanedamp.meshes.vane_cluster import SHIPPED
-from vanedamp.studies.demo.curve import Curve, curves, worst_of
-from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureScenes, Structure
+from vanedamp.studies.demo.curve import DampedCurve, curves, worst_of
+from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureScenes, FigureStructure
 from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.jobs.sweep import SweepJob
-from vanedamp.studies.report.claims import CLAIMS, Claim, Study
+from vanedamp.studies.report.claims import CLAIMS, Claim, ClaimStudy
 from vanedamp.studies.worst_start import STARTS
 
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
@@ -43,7 +43,7 @@ class Session:
     that the folder has.
     """
 
-    structure: Structure
+    structure: FigureStructure
     folder: Path
     pool: Executor | None = None
     effort: Effort | None = None
@@ -53,7 +53,7 @@ class Session:
         """Read a figure's scenes, on the structure."""
         return FigureScenes.load(file, self.structure, self.effort)
 
-    def read(self, sweep: Sweep, name: str) -> list[Curve]:
+    def read(self, sweep: Sweep, name: str) -> list[DampedCurve]:
         """Return the curves of a sweep, each the worst over the starts of the effort."""
         lines, starts = curves(sweep, name), [] if self.effort is None else [STARTS[key] for key in self.effort.starts]
         if not starts:
@@ -81,11 +81,11 @@ class Read:
     """A figure's scenes and curves, and the session in which they were computed."""
 
     figure: FigureScenes
-    curves: dict[str, list[Curve]]
+    curves: dict[str, list[DampedCurve]]
     session: Session
 
     @property
-    def labels(self) -> dict[str, list[Curve]]:
+    def labels(self) -> dict[str, list[DampedCurve]]:
         """The curves by their names in pictures."""
         return {name.replace("_", " "): of for name, of in self.curves.items()}
 
@@ -103,7 +103,7 @@ class FigureStudy(NamedTuple):
     picture: Callable[[Read, Path], None] = draw_first
 
 
-def study(of: FigureStudy, session: Session) -> Study:
+def study(of: FigureStudy, session: Session) -> ClaimStudy:
     """Run one study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
     figure = session.figure(of.file)
     sweeps = {curve: session.swept(figure, curve) for curve in figure.scenes}
@@ -117,7 +117,7 @@ def study(of: FigureStudy, session: Session) -> Study:
         failed = f" ({count} of {sum(sweep.status.size for sweep in sweeps.values())} points are not ok.)"
         claims = [replace(claim, why=(claim.why + failed).strip()) for claim in claims]
     sources = [f"{figure.stem(curve)}.h5" for curve in sweeps]
-    return written(Study(figure.name, figure.title, sources, claims, ", ".join(trouble)), session.folder)
+    return written(ClaimStudy(figure.name, figure.title, sources, claims, ", ".join(trouble)), session.folder)
 
 
 def provenance(scene: Scene) -> dict[str, Any]:
@@ -133,7 +133,7 @@ def _trouble(curve: str, sweep: Sweep) -> list[str]:
     return [f"{name} {count} of {sweep.status.size} {status}".strip() for status, count in counts.items()]
 
 
-def prepare(folder: Path) -> Structure:
+def prepare(folder: Path) -> FigureStructure:
     """Make the shipped cluster's case, with its modes.h5 and rom.h5, in a folder."""
     from vanedamp.studies.case.stages import assemble, modal_analysis, reduction
     from vanedamp.studies.case.tables import Case
@@ -145,7 +145,7 @@ def prepare(folder: Path) -> Structure:
     structure = assemble(Case.load(case))
     modal_analysis(structure).save(modes)
     reduction(structure, MODES).save(reduced)
-    return Structure.load(modes, reduced)
+    return FigureStructure.load(modes, reduced)
 
 
 def write_scene(scene: Scene, path: Path, title: str) -> None:
@@ -157,13 +157,13 @@ def write_scene(scene: Scene, path: Path, title: str) -> None:
     write_commented(path, relative(short_form(scene), path), KINDS["scene"], notes)
 
 
-def written(study: Study, folder: Path) -> Study:
+def written(study: ClaimStudy, folder: Path) -> ClaimStudy:
     """Write a study's claims, and return it."""
     write_json(folder / f"{study.study}{CLAIMS}", finite(asdict(study)))
     return study
 
 
-def print_claims(study: Study, seconds: float) -> None:
+def print_claims(study: ClaimStudy, seconds: float) -> None:
     """Print a study's claims: the paper's words, the finding here, the verdict."""
     print(f"\n{study.study}: {study.title} ({seconds:.1f} s)")
     if study.not_ok:

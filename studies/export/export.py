@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from vanedamp.files.extensions import ExtensionPoint
 from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.export.record import Record, Saved, read_record
+from vanedamp.studies.export.record import ExportRecord, Saved, read_record
 
 FORMATS = ExtensionPoint(
     "format of exports", "vanedamp.studies.export.formats", "vanedamp.export_formats",
@@ -56,7 +56,9 @@ def format_of(path: str | os.PathLike[str]) -> Format:
     raise InputError(f"{path}: expected a file name ending in one of {endings}")
 
 
-def write(record: Record, chosen: Format, path: str | os.PathLike[str], options: dict[str, Any]) -> tuple[str, ...]:
+def write(
+    record: ExportRecord, chosen: Format, path: str | os.PathLike[str], options: dict[str, Any]
+) -> tuple[str, ...]:
     """Write a record in a format. Returns warnings; raises InputError and StoreError."""
     writer = chosen.WRITERS.get(record.kind) or chosen.WRITERS.get(ANY)
     if writer is None:

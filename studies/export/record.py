@@ -25,7 +25,7 @@ class Saved(Protocol):
         """Write the result's HDF5 file."""
 
 
-class Record(NamedTuple):
+class ExportRecord(NamedTuple):
     """A record: the file or object it is of, its name, kind, variables by name, and attributes as plain data."""
 
     source: Any
@@ -47,11 +47,11 @@ class Record(NamedTuple):
         return self.source if isinstance(self.source, ReducedModel) else ReducedModel.load(self.source)
 
 
-def read_record(result: str | os.PathLike[str] | Saved) -> Record:
+def read_record(result: str | os.PathLike[str] | Saved) -> ExportRecord:
     """Return the record of a result, in a file or in memory. Raises StoreError."""
     if isinstance(result, str | os.PathLike):
         kind, variables, attributes = store.load_any(result)
-        return Record(
+        return ExportRecord(
             result, str(result), kind, variables, {name: _decoded(value) for name, value in attributes.items()}
         )
     if not hasattr(result, "save"):

@@ -16,7 +16,7 @@ from vanedamp.files.toml_output import toml
 from vanedamp.rom.external import external_model, plain_matrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.export.export import OUTPUT, Option
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 
 DESCRIPTION = Option(
     "description", "of a reduced model's matrices: write the file by which `vanedamp import` reads them",
@@ -34,8 +34,8 @@ _NOTABLE = 1e-9
 
 
 def write_model(
-    record: Record, path: Path, coordinates: str | None, description: str | None, write: Writer, *, text: bool = True,
-    damping: bool = True, base_load: bool = False,
+    record: ExportRecord, path: Path, coordinates: str | None, description: str | None, write: Writer, *,
+    text: bool = True, damping: bool = True, base_load: bool = False,
 ) -> tuple[str, ...]:  # fmt: skip
     """Write the matrices of a reduced model, and their description. Returns warnings; raises InputError.
 
@@ -52,7 +52,7 @@ def write_model(
     return _left_out(model, damping, base_load) + lost
 
 
-def _model_in(record: Record, coordinates: str | None) -> ReducedModel:
+def _model_in(record: ExportRecord, coordinates: str | None) -> ReducedModel:
     """Return the reduced model of a record in its own coordinates or natural ones. Raises InputError."""
     if coordinates not in (None, "own", "natural"):
         raise InputError(f"--coordinates: expected own or natural, not {coordinates!r}")

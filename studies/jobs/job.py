@@ -29,7 +29,7 @@ from vanedamp.studies.terminal import progress, stage
 Write = Callable[[str], object]
 
 
-class Saved(Protocol):
+class SavedResult(Protocol):
     """A result with a file and JSON."""
 
     def save(self, path: str) -> object:
@@ -67,7 +67,7 @@ class JobResult:
     unfinished whether the checkpoint stays, for the same command to go on from
     """
 
-    record: Saved
+    record: SavedResult
     lines: Callable[[float], Iterable[str]]
     sentence: str
     notes: Sequence[str] = ()

@@ -22,7 +22,7 @@ from vanedamp.studies.headline import format_value
 from vanedamp.studies.jobs.budget import check_run, check_sweep
 from vanedamp.studies.jobs.job import Job, JobResult, Means, SceneJob, Write, choice_notes
 from vanedamp.studies.jobs.points import ends_of, finished
-from vanedamp.studies.report.designs import Design, designs
+from vanedamp.studies.report.designs import DesignCurves, designs
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.sector_charts import ring_sentence
 from vanedamp.studies.terminal import progress
@@ -156,7 +156,7 @@ def peak(points: Grid, result: Sweep, path: str) -> tuple[str, dict[str, Write]]
     return f"--peak: {path} is the run at {at}", {"peak": lambda file: response.save(file, provenance)}
 
 
-def _summary(result: Sweep, judged: Sequence[Design], size: str, seconds: float) -> Iterator[str]:
+def _summary(result: Sweep, judged: Sequence[DesignCurves], size: str, seconds: float) -> Iterator[str]:
     """Yield the headlines of designs, best first, each of its worst curve, and how many points are not ok."""
     if len(judged) > _MOST_LINES:
         yield f"the {_MOST_LINES} best of {len(judged)} designs; --json and the report have all:"

@@ -32,7 +32,7 @@ from typing import Protocol
 from vanedamp.studies.facts import Fact, Found
 
 
-class Kind(Protocol):
+class ResultKind(Protocol):
     """The contract of a kind's folder."""
 
     NAME: str
@@ -50,18 +50,18 @@ def names() -> list[str]:
     return sorted(name if name in _UNDERSCORED else name.replace("_", "-") for name in folders if name != _PAGE_ONLY)
 
 
-def kind(name: str) -> Kind | None:
+def kind(name: str) -> ResultKind | None:
     """Return the kind of a name; None where there is none."""
     return _loaded(name) if name in names() else None
 
 
-def of_command(command: str) -> Kind | None:
+def of_command(command: str) -> ResultKind | None:
     """Return the kind that a command writes; None where there is none."""
     return kind(command) or next((entry for entry in map(_loaded, names()) if command in entry.COMMANDS), None)
 
 
-def _loaded(name: str) -> Kind:
-    module: Kind = import_module(f"{__name__}.{name.replace('-', '_')}")
+def _loaded(name: str) -> ResultKind:
+    module: ResultKind = import_module(f"{__name__}.{name.replace('-', '_')}")
     return module
 
 

@@ -14,7 +14,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.report.results import collect, sections
-from vanedamp.studies.report.time_history import History
+from vanedamp.studies.report.time_history import TimeHistory
 
 
 def plot(result: Any, scene: Scene | None = None) -> go.Figure:
@@ -33,7 +33,7 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     if isinstance(result, str | Path):
         return _of_file(result)
     if isinstance(result, Response):
-        result = History.of(result, scene)
+        result = TimeHistory.of(result, scene)
     if isinstance(result, RingModes):
         result = Interference(result)
     kind = getattr(result, "KIND", None)

@@ -18,7 +18,7 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.worker import OF_A_POINT, SweepError
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError, tables
-from vanedamp.studies.life.study import HALVINGS, Contact, LifeStudy
+from vanedamp.studies.life.study import HALVINGS, LifeStudy, WearContact
 from vanedamp.studies.measure import Measure
 
 #: statuses of runs that came to their end, whose figures count; those but the first are reported
@@ -27,7 +27,7 @@ _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN, Status.TILTED)
 _AMPLITUDE, _CONFIDENCE, _OK, _RATES = range(4)
 
 
-class Found(NamedTuple):
+class BandMeans(NamedTuple):
     """Means over the band at a state.
 
     rate, confidence: (c,) volumes of wear per hour, m^3/h, and half widths of their 95 % confidence intervals.
@@ -43,7 +43,7 @@ class Found(NamedTuple):
     reduction_confidence: float
 
 
-def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[Contact]]:
+def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[WearContact]]:
     """Return the row of a run and its contacts; nan, and none, where it failed: the task of a worker.
 
     The confidence of what counts is taken to be that of the mean amplitude, relative to it.
@@ -56,7 +56,7 @@ def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[Contact]
         return np.array([np.nan, np.nan, 0.0]), []
     wear = response.wear or ()
     contacts = [
-        Contact(item.damper, item.side, item.corner, np.nan if item.area is None else item.area, item.share)
+        WearContact(item.damper, item.side, item.corner, np.nan if item.area is None else item.area, item.share)
         for item in wear
     ]
     usable = response.status in _USABLE
@@ -73,7 +73,7 @@ def _or(value: float | None, default: float) -> float:
     return default if value is None else value
 
 
-class Runs(SceneCheckpoint):
+class LifeRuns(SceneCheckpoint):
     """Runs of a life so far, in memory and in a file (path None: in memory only).
 
     The same life asks for the same runs in the same order, and begins with those kept.
@@ -90,14 +90,14 @@ class Runs(SceneCheckpoint):
         belongs = {"life": ("study", json.loads(json.dumps(tables(study.table))))}
         super().__init__(path, "life-checkpoint", study.scene, provenance, belongs)
         self.study, self._executor, self._progress = study, executor, progress
-        self.contacts: list[Contact] = []
+        self.contacts: list[WearContact] = []
         self._rows: list[np.ndarray] = []
         self.asked = self.trouble = 0
         if (content := self.read()) is not None:
             self._rows = list(content[0]["runs"])
-            self.contacts = [Contact(*values) for values in json.loads(content[1]["contacts"])]
+            self.contacts = [WearContact(*values) for values in json.loads(content[1]["contacts"])]
 
-    def at(self, scene: Scene) -> Found:
+    def at(self, scene: Scene) -> BandMeans:
         """Run a scene over the band, unless the runs are kept, and return its means. Raises SweepError."""
         rows, beyond = self._at(scene, self.study.frequencies.tolist()), 0.0
         band = len(rows)
@@ -154,7 +154,7 @@ class Runs(SceneCheckpoint):
             return map(run_point, points, measures)
         return _handed_out(self._executor, points, measures)
 
-    def _means(self, rows: np.ndarray, band: int, beyond: float) -> Found:
+    def _means(self, rows: np.ndarray, band: int, beyond: float) -> BandMeans:
         """Return the means of points (k, columns), those of the band first.
 
         beyond: m, by which the worst may be worse.
@@ -178,7 +178,7 @@ class Runs(SceneCheckpoint):
         if table.over_band == "mean":
             reduction = 1.0 - float(in_band[np.isfinite(in_band)].mean())
             confidence = float(np.sqrt((half[:band] ** 2).sum()) / max(ok[:band].sum(), 1))
-        return Found(
+        return BandMeans(
             weights @ rates[:, :c], np.sqrt(weights**2 @ rates[:, c:] ** 2), amplitude[:band], spread[:band],
             reduction, confidence,
         )  # fmt: skip

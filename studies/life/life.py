@@ -13,10 +13,10 @@ import numpy as np
 
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, tables
-from vanedamp.studies.life.fast import Found, Runs
+from vanedamp.studies.life.fast import BandMeans, LifeRuns
 from vanedamp.studies.life.record import LifeRecord, sentence_of
 from vanedamp.studies.life.slow import STAGES, Moment, Steps, between, integrate, steps_left
-from vanedamp.studies.life.study import LifeStudy, Wearing
+from vanedamp.studies.life.study import LifeStudy, WearEffect
 from vanedamp.studies.worst_start import worst_start
 
 #: width of the interval in which the threshold is passed, over the hours, below which it is not halved any more
@@ -40,7 +40,7 @@ def life(
     Raises InputError for a contact that opens a gap and whose patch is not known, SweepError where workers are lost.
     """
     expected = _Expected(study, progress)
-    with Runs(checkpoint, study, executor, provenance or {}, expected) as runs:
+    with LifeRuns(checkpoint, study, executor, provenance or {}, expected) as runs:
         try:
             first = runs.at(study.scene)
             wearing = study.wearing(runs.contacts)
@@ -70,7 +70,7 @@ class _Expected:
         """Return the progress of runs that follow those done."""
         return lambda more, _: self(done + more)
 
-    def at(self, asked: int, before: Moment[Found] | None, now: Moment[Found], steps: Steps) -> None:
+    def at(self, asked: int, before: Moment[BandMeans] | None, now: Moment[BandMeans], steps: Steps) -> None:
         """Expect the runs from a moment on, with those asked for so far and the moment before.
 
         The reduction goes on as since then; once it is lost, the time at which that was is halved a few times.
@@ -95,16 +95,16 @@ class WornAway(Exception):
 class _Course:
     """Rates by volumes of wear, and the scales of these."""
 
-    def __init__(self, study: LifeStudy, wearing: Wearing, runs: Runs, first: Found) -> None:
+    def __init__(self, study: LifeStudy, wearing: WearEffect, runs: LifeRuns, first: BandMeans) -> None:
         self.study, self.wearing, self._runs = study, wearing, runs
-        self._new: Found | None = first
+        self._new: BandMeans | None = first
 
     @property
     def asked(self) -> int:
         """Runs asked for so far."""
         return self._runs.asked
 
-    def rates(self, volume: np.ndarray) -> Found:
+    def rates(self, volume: np.ndarray) -> BandMeans:
         """Return what is found with some wear."""
         if np.any(self.wearing.lost(volume) >= 1.0):
             raise WornAway
@@ -134,7 +134,7 @@ class _Course:
         return scale
 
 
-def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[Found]]:
+def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[BandMeans]]:
     """Yield the moments, those between two steps as well where the threshold is passed."""
     table, threshold, before, damped = course.study.table, course.study.threshold, None, False
     steps = Steps(table.tolerance, table.reach, course.scale, table.steps)
@@ -153,7 +153,7 @@ def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[Found]]:
             before = now
 
 
-def _worn_away(wearing: Wearing, last: Moment[Found]) -> tuple[float, int] | None:
+def _worn_away(wearing: WearEffect, last: Moment[BandMeans]) -> tuple[float, int] | None:
     """Return when a body is worn away at the rates of the last moment, h, and its number; None: never, or not known."""
     rate, remaining = wearing.losses @ last.found.rate, 1.0 - wearing.lost(last.state)
     spans = np.divide(remaining, rate, out=np.full(len(remaining), np.inf), where=np.isfinite(remaining) & (rate > 0.0))
@@ -161,16 +161,16 @@ def _worn_away(wearing: Wearing, last: Moment[Found]) -> tuple[float, int] | Non
     return (last.time + float(spans[first]), first) if np.isfinite(spans[first]) else None
 
 
-def _passes(before: Moment[Found], after: Moment[Found], threshold: float) -> bool:
+def _passes(before: Moment[BandMeans], after: Moment[BandMeans], threshold: float) -> bool:
     return (before.found.reduction >= threshold) != (after.found.reduction >= threshold)
 
 
-def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Iterator[Moment[Found]]:
+def _halved(course: _Course, before: Moment[BandMeans], after: Moment[BandMeans]) -> Iterator[Moment[BandMeans]]:
     """Yield moments between two, until the time at which the reduction passes the threshold is known well enough.
 
     It is, too, where reductions differ by less than their confidence.
     """
-    table, first, last, moments = course.study.table, before, after, list[Moment[Found]]()
+    table, first, last, moments = course.study.table, before, after, list[Moment[BandMeans]]()
     while last.time - first.time > _CLOSE * table.hours:
         change = abs(last.found.reduction - first.found.reduction)
         if change < max(last.found.reduction_confidence, first.found.reduction_confidence):
@@ -184,7 +184,7 @@ def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Ite
 
 
 def _record(
-    study: LifeStudy, wearing: Wearing, runs: Runs, moments: list[Moment[Found]], starts: dict[str, Any],
+    study: LifeStudy, wearing: WearEffect, runs: LifeRuns, moments: list[Moment[BandMeans]], starts: dict[str, Any],
     provenance: dict[str, Any],
 ) -> LifeRecord:  # fmt: skip
     """Return the record of moments in the order of their times."""

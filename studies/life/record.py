@@ -10,7 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.files.record import Array, Record
-from vanedamp.studies.life.study import Contact, LifeStudy
+from vanedamp.studies.life.study import LifeStudy, WearContact
 from vanedamp.studies.worst_start import worst_words
 
 _Moments = Annotated[np.ndarray, Array(("time",))]
@@ -25,7 +25,7 @@ class LifeRecord(Record):
     """the [life] table and the scene, as plain data"""
     reference: float
     """amplitude without bodies in the band: its maximum, or its mean [m]; or the limit of what counts, in its unit"""
-    contacts: tuple[Contact, ...]
+    contacts: tuple[WearContact, ...]
     """that wear: body, side and corner, area of the patch, share of the cavity"""
     frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
     """of the band"""

@@ -35,10 +35,10 @@ class Rated(Protocol):
         """Half widths (k,)."""
 
 
-Found = TypeVar("Found", bound=Rated)
+Rates = TypeVar("Rates", bound=Rated)
 
 
-class Moment(NamedTuple, Generic[Found]):
+class Moment(NamedTuple, Generic[Rates]):
     """A state (k,) at a time, what was found there, and how well it is known.
 
     band: (k,) half widths of 95 % intervals, by the confidence of the rates; error: (k,) bound of the steps' errors, as
@@ -47,7 +47,7 @@ class Moment(NamedTuple, Generic[Found]):
 
     time: float
     state: np.ndarray
-    found: Found
+    found: Rates
     band: np.ndarray
     error: np.ndarray
 
@@ -66,11 +66,11 @@ class Steps(NamedTuple):
 
 
 def integrate(
-    rates: Callable[[np.ndarray], Found], state: np.ndarray, end: float, steps: Steps
-) -> Iterator[Moment[Found]]:
+    rates: Callable[[np.ndarray], Rates], state: np.ndarray, end: float, steps: Steps
+) -> Iterator[Moment[Rates]]:
     """Yield the moments from time 0 to the end, the first and the last included."""
     zero = np.zeros(len(state))
-    now: Moment[Found] = Moment(0.0, state, rates(state), zero, zero)
+    now: Moment[Rates] = Moment(0.0, state, rates(state), zero, zero)
     yield now
     step = _longest(now, end, steps) if steps.fixed is None else end / steps.fixed
     while now.time < end * (1.0 - 1e-12):
@@ -92,7 +92,7 @@ def integrate(
             step = max(step, _SHORTEST * end)
 
 
-def between(before: Moment[Found], after: Moment[Found], time: float) -> tuple[np.ndarray, np.ndarray]:
+def between(before: Moment[Rates], after: Moment[Rates], time: float) -> tuple[np.ndarray, np.ndarray]:
     """Return state and band (k,) at a time between two moments: the cubic by both rates, and between the bands."""
     span = after.time - before.time
     s = (time - before.time) / span
@@ -102,7 +102,7 @@ def between(before: Moment[Found], after: Moment[Found], time: float) -> tuple[n
     return state, (1 - s) * before.band + s * after.band
 
 
-def steps_left(now: Moment[Found], until: float, step: float, steps: Steps) -> int:
+def steps_left(now: Moment[Rates], until: float, step: float, steps: Steps) -> int:
     """Return about how many steps like the last one (0: none yet) lead from a moment to a time.
 
     Its rates stay, so that scales, and the steps with them, grow by the same factor each time.
@@ -116,18 +116,18 @@ def steps_left(now: Moment[Found], until: float, step: float, steps: Steps) -> i
     return int(np.ceil(np.log1p(span * fastest) / np.log1p(min(step * fastest, steps.reach))))
 
 
-def _fastest(now: Moment[Found], steps: Steps) -> float:
+def _fastest(now: Moment[Rates], steps: Steps) -> float:
     """Return the growth of the states per unit of time, over their scales, at most."""
     return float(np.max(np.abs(now.found.rate) / steps.scale(now.state), initial=0.0))
 
 
-def _longest(now: Moment[Found], end: float, steps: Steps) -> float:
+def _longest(now: Moment[Rates], end: float, steps: Steps) -> float:
     """Return the step in which no state grows by more than its reach."""
     fastest = _fastest(now, steps)
     return min(end, steps.reach / fastest) if fastest > 0.0 else end
 
 
-def _step(rates: Callable[[np.ndarray], Found], now: Moment[Found], step: float) -> tuple[Moment[Found], np.ndarray]:
+def _step(rates: Callable[[np.ndarray], Rates], now: Moment[Rates], step: float) -> tuple[Moment[Rates], np.ndarray]:
     """Return the moment after a step, and by how much its error exceeds the confidence of the rates (k,)."""
     evaluated = [now.found]
     for weights in STAGES:

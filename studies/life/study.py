@@ -81,7 +81,7 @@ class LifeFile(Scene):
     """hours of operation and the reduction to keep"""
 
 
-class Contact(NamedTuple):
+class WearContact(NamedTuple):
     """A contact that wears: body, side and corner as of an Event; patch, m^2 (nan: unknown); share of the cavity."""
 
     damper: int
@@ -156,7 +156,7 @@ class LifeStudy(NamedTuple):
         """About how many runs a life takes."""
         return _EVALUATIONS * self.each + self.starts
 
-    def wearing(self, contacts: Sequence[Contact]) -> Wearing:
+    def wearing(self, contacts: Sequence[WearContact]) -> WearEffect:
         """Return how the scene wears at its contacts.
 
         Raises InputError for a contact that opens a gap and whose patch is not known.
@@ -172,7 +172,7 @@ class LifeStudy(NamedTuple):
                 "the body (damper or wear), or wear.area, m^2"
             )
         area = np.where(np.isnan(area), 1.0, area)
-        return Wearing(scene, gap / area, play / area, body_shares(scene, contacts))
+        return WearEffect(scene, gap / area, play / area, body_shares(scene, contacts))
 
     def points(self, scene: Scene, frequencies: Sequence[float]) -> list[Scene]:
         """Return a scene at some frequencies (f,), Hz."""
@@ -180,7 +180,7 @@ class LifeStudy(NamedTuple):
         return [points.scene(drive(scene, float(frequency))) for frequency in frequencies]
 
 
-class Wearing(NamedTuple):
+class WearEffect(NamedTuple):
     """How volumes of wear (c,), m^3, change a scene: gaps and plays by matrices (cavities, c), 1/m^2.
 
     shares: (bodies, c) of the volumes that the bodies lose.

@@ -20,7 +20,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Study:
+class ClaimStudy:
     """A study of several results; sources: names of their files, in its own folder; not_ok: which points are not ok."""
 
     study: str

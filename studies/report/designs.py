@@ -19,7 +19,7 @@ from vanedamp.studies.report.forced_response import ForcedResponse
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class DesignCurves:
     """The curves of a design, the one with the highest damped peak first."""
 
     curves: tuple[ForcedResponse, ...]
@@ -64,7 +64,7 @@ class Design:
         return self.worst.to_json() | of | {"sentence": self.sentence}
 
 
-def designs(responses: Iterable[ForcedResponse]) -> list[Design]:
+def designs(responses: Iterable[ForcedResponse]) -> list[DesignCurves]:
     """Return the designs of some curves, the best first: the one whose worst curve has the lowest damped peak.
 
     Peaks are relative to those without bodies. Designs are at the end if a point that is not ok may be their peak.
@@ -73,7 +73,7 @@ def designs(responses: Iterable[ForcedResponse]) -> list[Design]:
     heights = np.array([curve.headline.peak_ratio for curve in curves])
     certain = np.array([curve.peak_known for curve in curves])
     judged = ranked([curve.design for curve in curves], heights, certain, certain)
-    return [Design(tuple(curves[index] for index in indices)) for indices in judged]
+    return [DesignCurves(tuple(curves[index] for index in indices)) for indices in judged]
 
 
 def best_first(responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:

@@ -69,20 +69,20 @@ def deformed(points: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndar
     return points + shape * (_EXAGGERATION * size / magnitude.max()), magnitude / magnitude.max()
 
 
-class Surface(NamedTuple):
+class MeshSurface(NamedTuple):
     """The nodes (n,) on a mesh's surface, and its triangles (t, 3) as places in them."""
 
     nodes: np.ndarray
     triangles: np.ndarray
 
 
-def small_surface(values: Mapping[str, np.ndarray], most: float = MOST_TRIANGLES) -> Surface | None:
+def small_surface(values: Mapping[str, np.ndarray], most: float = MOST_TRIANGLES) -> MeshSurface | None:
     """Return the surface of a record of modes, if a page can carry it: so many triangles at most."""
     cells = values["cell"]
     if cells.shape[1] not in _FACES:
         return None
     nodes, triangles = np.unique(surface(cells), return_inverse=True)
-    return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * most else None
+    return MeshSurface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * most else None
 
 
 def viewpoint(points: np.ndarray, shape: np.ndarray, elevations: Sequence[float] = (_ELEVATION,)) -> np.ndarray:
@@ -109,7 +109,7 @@ def _in_sight(points: np.ndarray, shape: np.ndarray, view: np.ndarray) -> float:
     return float(np.sum((shape[nearest] @ across) ** 2))
 
 
-def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.Figure:
+def mode_figure(values: Mapping[str, np.ndarray], of: MeshSurface, mode: int) -> go.Figure:
     """Draw the modes of a record of `vanedamp modal`, one at a time, beginning with `mode`; in mm.
 
     The layout's `meta` has the nodes at rest, from which `modes.js` animates them.
@@ -149,7 +149,7 @@ def in_space(figure: go.Figure, view: np.ndarray) -> go.Figure:
 
 
 def spots_figure(
-    values: Mapping[str, np.ndarray], of: Surface, mode: int, spots: Mapping[str, Mapping[str, Any]]
+    values: Mapping[str, np.ndarray], of: MeshSurface, mode: int, spots: Mapping[str, Mapping[str, Any]]
 ) -> go.Figure:
     """Draw the structure at rest, in mm, coloured by the mode's von Mises stress, and hot spots on it.
 
@@ -174,12 +174,12 @@ def spots_figure(
     return in_space(figure, viewpoint(points, np.where(near[:, None], shape, 0.0), (_ELEVATION, -_ELEVATION)))
 
 
-def spots_rows(values: Mapping[str, np.ndarray], of: Surface) -> Iterator[list[float]]:
+def spots_rows(values: Mapping[str, np.ndarray], of: MeshSurface) -> Iterator[list[float]]:
     """Yield x, y, z (m) and von Mises stress per displacement (Pa/m) at the nodes of the surface."""
     yield from np.column_stack([values["coordinates"][of.nodes], values["von_mises"][of.nodes]]).tolist()
 
 
-def mode_rows(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> Iterator[list[float]]:
+def mode_rows(values: Mapping[str, np.ndarray], of: MeshSurface, mode: int) -> Iterator[list[float]]:
     """Yield x, y, z (m) and the displacements of a mode at the nodes of the surface."""
     moved = values["shape"][mode].reshape(-1, 3)
     yield from np.column_stack([values["coordinates"][of.nodes], moved[of.nodes]]).tolist()

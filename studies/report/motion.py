@@ -38,7 +38,7 @@ _SIDES = dict(zip(SIDES, OUTWARDS, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
-class BodyMotion:
+class BodyFrames:
     """A body as drawn in n frames, in units of the drawing, y upwards.
 
     form: as which it ran
@@ -63,7 +63,7 @@ class BodyMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class ContactMotion:
+class ContactFrames:
     """A contact as drawn: body, side and corner as of an event, points (n, 2), light (n,) OPEN, CLOSED or HIT."""
 
     place: tuple[int, str, int]
@@ -79,7 +79,7 @@ class CeilingPart(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class CavityMotion:
+class CavityFrames:
     """A cavity as drawn, in the frame of its floor, whose middle is at (0, 0).
 
     left, right: (n, 2) faces of the walls at the height of the floor and at `height`; ceiling: parts above each body,
@@ -92,12 +92,12 @@ class CavityMotion:
     ceiling: list[CeilingPart]
     shift: np.ndarray
     height: float
-    bodies: list[BodyMotion]
-    contacts: list[ContactMotion]
+    bodies: list[BodyFrames]
+    contacts: list[ContactFrames]
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RunFrames:
     """Frames of the last periods of a run.
 
     time: (n,) periods; each: frames per period; displacement: (n,) m, of the response; factor: by which free travels
@@ -110,7 +110,7 @@ class Motion:
     factor: float
     swing: float
     scale: float
-    cavities: list[CavityMotion]
+    cavities: list[CavityFrames]
     sampled: int
 
     @property
@@ -162,7 +162,7 @@ def motion_of(
     along: np.ndarray,
     plane: PlanarSamples,
     impacts: list[tuple[float, tuple[int, str, int]]],
-) -> Motion:
+) -> RunFrames:
     """Return the last periods of a run.
 
     time: (t,) s; displacement: (t,) m; along: (t, b) m in the cavity; impacts: time (s) and place as of an event.
@@ -183,7 +183,7 @@ def motion_of(
         struck = np.array([contact == struck_contact for contact in plane.contacts])
         light[recent[:, None] & struck] = HIT
     cavities = [draw.cavity(cavity, light) for cavity in scene.cavity if scene.bodies_in(cavity)]
-    return Motion(
+    return RunFrames(
         time / period, sampled // stride, displacement[frames], factor, swing, draw.scale, cavities, sampled,
     )  # fmt: skip
 
@@ -201,7 +201,7 @@ class _Drawing:
     swing: float
     scale: float
 
-    def cavity(self, cavity: Cavity, light: np.ndarray) -> CavityMotion:
+    def cavity(self, cavity: Cavity, light: np.ndarray) -> CavityFrames:
         """Draw a cavity and its bodies, which stand from left to right. light: (n, contacts)."""
         inside = self.scene.bodies_in(cavity)
         length = sum(2 * self.half[k][0] for k in inside)
@@ -223,7 +223,7 @@ class _Drawing:
         across = np.nan_to_num(self.plane.floor_across[:, k]) - rotation * mids[0]
         shift = self.swing * np.column_stack([self.scale * self.plane.floor_along[:, k], self.scale * across, rotation])
         contacts = [
-            ContactMotion(contact, self._points(number, bodies), light[:, number])
+            ContactFrames(contact, self._points(number, bodies), light[:, number])
             for number, contact in enumerate(self.plane.contacts)
             if contact[1] in (*SIDES, "body") and any(body.number == contact[0] for body in bodies)
         ]
@@ -231,13 +231,13 @@ class _Drawing:
             self.scale * (sign * (length + self.factor * cavity.gap) / 2 + self.factor * wall)
             for sign, wall in zip((-1, 1), walls, strict=True)
         )
-        return CavityMotion(cavity.name, left, right, ceiling, shift, self.scale * highest, bodies, contacts)
+        return CavityFrames(cavity.name, left, right, ceiling, shift, self.scale * highest, bodies, contacts)
 
     def _pose(self, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return along, lift and tilt (n,) of a body's centre in the frame of its floor."""
         return self.along[:, k], np.nan_to_num(self.plane.body_lift[:, k]), np.nan_to_num(self.plane.body_tilt[:, k])
 
-    def _body(self, k: int, mid: float) -> BodyMotion:
+    def _body(self, k: int, mid: float) -> BodyFrames:
         along, lift, tilt = self._pose(k)
         a, b = self.half[k]
         centre = np.column_stack([mid + self.factor * along, b + self.factor * lift])
@@ -249,7 +249,7 @@ class _Drawing:
         else:
             outline = centre[:, None, :] + _turned(turn, self._corners(k))
         face = form.face(damper) if form.extended else (b, b)
-        return BodyMotion(
+        return BodyFrames(
             k, form, (self.scale * a, self.scale * b), self.scale * outline,
             (self.scale * face[0], self.scale * face[1]), self.along[:, k], self.plane.body_lift[:, k],
             self.plane.body_tilt[:, k],
@@ -293,7 +293,7 @@ class _Drawing:
         b = self.half[k][1]
         return sign * self._moved(k, side, cavity.gap / 2, -b, height - b)
 
-    def _points(self, number: int, bodies: list[BodyMotion]) -> np.ndarray:
+    def _points(self, number: int, bodies: list[BodyFrames]) -> np.ndarray:
         """Return the point of a body at which a contact acts (n, 2)."""
         k, side, corner = self.plane.contacts[number]
         index = next(i for i, body in enumerate(bodies) if body.number == k)
@@ -348,7 +348,7 @@ def _rounded(value: float) -> float:
     return float(f"{math.floor(value / unit) * unit:.2g}")
 
 
-def _drawn(cavity: CavityMotion) -> dict[str, Any]:
+def _drawn(cavity: CavityFrames) -> dict[str, Any]:
     """Return a cavity for the player: shapes, and one entry a frame of what moves."""
     down = np.array([1.0, -1.0])
     shift = cavity.shift * (1.0, -1.0, -180.0 / math.pi)

@@ -24,10 +24,10 @@ from vanedamp.files.store import csv_text, decoding, digest, replacing
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.hot_spots import plus_minus
 from vanedamp.studies.report.charts import Chart, chart
-from vanedamp.studies.report.claims import CLAIMS, Study
-from vanedamp.studies.report.motion import Motion
+from vanedamp.studies.report.claims import CLAIMS, ClaimStudy
+from vanedamp.studies.report.motion import RunFrames
 from vanedamp.studies.report.motion_page import environment
-from vanedamp.studies.report.results import Result, Results, Section, format_setting, sections
+from vanedamp.studies.report.results import ReportSection, Result, Results, format_setting, sections
 from vanedamp.studies.report.summary import summary
 
 _FOLDER = Path(__file__).parent
@@ -55,7 +55,7 @@ class Page:
     """
 
     results: Results
-    known: Mapping[str, Section]
+    known: Mapping[str, ReportSection]
     names: Mapping[str, str]
     environment: jinja2.Environment
     study: str | None = None
@@ -70,7 +70,7 @@ class Page:
         self.charts[kind] += 1
         return chart(name, figure, header, rows, files)
 
-    def motion(self, motion: Motion, files: Iterable[str]) -> Chart:
+    def motion(self, motion: RunFrames, files: Iterable[str]) -> Chart:
         """Return the player of a motion for the template's macro `plot`."""
         name = f"motion-{self.charts['motion']}"
         self.charts["motion"] += 1
@@ -79,7 +79,7 @@ class Page:
 
     def blocks(self) -> str:
         """Return the sections of all results, as HTML; those of a study have its title."""
-        studies: list[tuple[Study | None, set[str]]] = [
+        studies: list[tuple[ClaimStudy | None, set[str]]] = [
             (result.record, set(self.results.parts(file))) for file, result in self.results.kinds[CLAIMS].items()
         ]
         unclaimed = set(self.results.by_file).difference(*(files for _, files in studies))
@@ -109,7 +109,7 @@ class Page:
         return "".join(itertools.chain.from_iterable(sections))
 
 
-def _shown(section: Section, results: Mapping[str, Result], page: Page) -> Any:
+def _shown(section: ReportSection, results: Mapping[str, Result], page: Page) -> Any:
     """Return the data of a section's template."""
     if hasattr(section, "section"):
         return section.section(results, page)

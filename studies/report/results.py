@@ -43,7 +43,7 @@ class Result:
         )
 
 
-class Section(Protocol):
+class ReportSection(Protocol):
     """The contract of a section; studies.kinds says more. Ours leave KIND, and most of them `load`, to their kind."""
 
     KIND: str
@@ -93,9 +93,9 @@ class Results:
         return [path for path in paths if path in results and not results[path].parts]
 
 
-def sections() -> dict[str, Section]:
+def sections() -> dict[str, ReportSection]:
     """Return the sections by the kind of result that they show, in the order of the page. Raises ExtensionError."""
-    by_kind: dict[str, Section] = {}
+    by_kind: dict[str, ReportSection] = {}
     for section in SECTIONS.all().values():
         kind = getattr(section, "KIND", None) or _folder(section).NAME
         if kind in by_kind:
@@ -139,14 +139,14 @@ def collect(paths: Sequence[str | Path]) -> Results:
     return results
 
 
-def _loaded(section: Section, path: Path) -> Result:
+def _loaded(section: ReportSection, path: Path) -> Result:
     if hasattr(section, "load"):
         return section.load(path)
     record = pkgutil.resolve_name(_folder(section).RECORD).load(path)
     return Result.of(record, _scene(record))
 
 
-def _folder(section: Section) -> Any:
+def _folder(section: ReportSection) -> Any:
     """Return the kind of a section of ours (studies.kinds)."""
     return import_module(section.__package__)
 

@@ -16,7 +16,7 @@ from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.hot_spots import plus_minus
-from vanedamp.studies.report.designs import Design, designs
+from vanedamp.studies.report.designs import DesignCurves, designs
 from vanedamp.studies.report.forced_response import forced_responses, linear_curves, model_name
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.map_chart import has_responses
@@ -103,7 +103,7 @@ def _bodies(scene: Scene, mass: float) -> Iterator[str]:
             yield f"Cavity {cavity.name}, gap {1e6 * cavity.gap:.4g} µm{play}: {'; '.join(words)}."
 
 
-def _answer(design: Design, count: int) -> list[str]:
+def _answer(design: DesignCurves, count: int) -> list[str]:
     """Return sentences on the best of a number of designs, by its worst curve."""
     best, headline = design.worst, design.worst.headline
     which = f"The best of {count} designs" if count > 1 else "The design"

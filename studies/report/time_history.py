@@ -18,7 +18,7 @@ from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
-from vanedamp.studies.report.motion import Motion, motion_of
+from vanedamp.studies.report.motion import RunFrames, motion_of
 from vanedamp.studies.report.plane_history import (
     ImpactsAtPlace,
     impacts_by_place,
@@ -32,7 +32,7 @@ _TICKS = 0.07
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class TimeHistory:
     """Samples of a run and its results.
 
     time          (n,) s, as sampled; displacement (n,) m at excitation.at
@@ -56,12 +56,12 @@ class History:
     scene: Scene | None
 
     @classmethod
-    def load(cls, path: str | Path) -> History:
+    def load(cls, path: str | Path) -> TimeHistory:
         """Read what `vanedamp run` wrote. Raises files.store.StoreError."""
         return cls.of(Response.load(path))
 
     @classmethod
-    def of(cls, response: Response, scene: Scene | None = None) -> History:
+    def of(cls, response: Response, scene: Scene | None = None) -> TimeHistory:
         """Return the history of a run; scene: that of a response that does not say."""
         impacts = (event for event in response.event_list if event.kind == "impact")
         whole, bodies = _unrolled(response.scene or scene), response.body_displacement  # in a file none without bodies
@@ -92,7 +92,7 @@ class History:
         """Number of the body of each impact (m,), -1: the structure's on a stop."""
         return np.array([body if meets_body(side) else -1 for _, (body, side, _) in self.hits], int)
 
-    def late(self) -> History:
+    def late(self) -> TimeHistory:
         """Return the last periods only, as many as a page carries."""
         begin = max(self.time[-1] - _MOST_PERIODS * self.period, self.time[-_MOST_SAMPLES:][0])
         shown = self.time >= begin
@@ -112,7 +112,7 @@ class History:
         plane = [] if self.plane is None else [self.plane.body_lift, self.plane.body_tilt]
         yield from np.column_stack([self.time, self.displacement, self.bodies, *plane]).tolist()
 
-    def motion(self) -> Motion | None:
+    def motion(self) -> RunFrames | None:
         """Return the data for the player of the page; None without bodies, or where a reduced model has moved."""
         if self.scene is None or not self.bodies.shape[1]:
             return None
@@ -135,7 +135,7 @@ def _unrolled(scene: Scene | None) -> Scene | None:
         return None
 
 
-def history_figure(history: History) -> go.Figure:
+def history_figure(history: TimeHistory) -> go.Figure:
     """Draw the displacement with a mark at every impact, above the bodies' places between the walls."""
     panels = _planar_panels(history)
     rows = 2 + len(panels) if history.bodies.shape[1] else 1
@@ -187,7 +187,7 @@ def history_figure(history: History) -> go.Figure:
     return dressed(figure, height=280 * rows)
 
 
-def _planar_panels(history: History) -> list[tuple[str, np.ndarray, str]]:
+def _planar_panels(history: TimeHistory) -> list[tuple[str, np.ndarray, str]]:
     """Return title, values (n, bodies) and unit of further panels for bodies in the plane."""
     if history.plane is None:
         return []

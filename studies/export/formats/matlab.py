@@ -14,7 +14,7 @@ from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.external import plain_matrices
 from vanedamp.studies.export.export import ANY
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 from vanedamp.studies.export.reduced_matrices import DESCRIPTION, describe
 
 SUMMARY = "all variables with units, dimensions and the scene: MATLAB, Octave"
@@ -27,7 +27,7 @@ _MOST_CELLS = 10_000
 _RESERVED = {"case", "catch", "end", "function", "otherwise", "parfor", "persistent", "spmd", "switch"}
 
 
-def write(record: Record, path: Path) -> None:
+def write(record: ExportRecord, path: Path) -> None:
     """Write variables under their names, `units` and `dimensions` of each, and the attributes with the scene."""
     from scipy.io import savemat
 
@@ -63,7 +63,7 @@ def write(record: Record, path: Path) -> None:
         savemat(temporary, dict(_unique(data.items())), long_field_names=True, oned_as="column", do_compression=True)
 
 
-def reduced_model(record: Record, path: Path, description: str | None = None) -> None:
+def reduced_model(record: ExportRecord, path: Path, description: str | None = None) -> None:
     """Write a reduced model; description: the file by which `vanedamp import` reads it back."""
     model = record.reduced_model()
     if description is not None and model.residual_flexibility is not None:

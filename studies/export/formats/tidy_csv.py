@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.files.store import Variable, write_csv
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.export.export import ANY, Option
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 
 SUMMARY = "tables with one row a point, units in the header: pandas, R, spreadsheets"
 ENDINGS = (".csv",)
@@ -35,7 +35,7 @@ _CHUNK, _MOST_COLUMNS = 4096, 1000
 Column = tuple[str, np.ndarray]
 
 
-def sweep(record: Record, path: Path, table: str | None = None) -> None:
+def sweep(record: ExportRecord, path: Path, table: str | None = None) -> None:
     """Write the grid of a sweep: a row a point, columns of its axes, statuses and measures.
 
     table: "section" has a row for each Poincare section of every point instead. Raises InputError for other rows, and
@@ -64,7 +64,7 @@ def sweep(record: Record, path: Path, table: str | None = None) -> None:
     _write(path, [*zip(names, (values.ravel() for values in points), strict=True), *columns])
 
 
-def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ...]:
+def table(record: ExportRecord, path: Path, table: str | None = None) -> tuple[str, ...]:
     """Write the variables over one dimension: a row an entry, further dimensions as columns of their own.
 
     Fields, which would be too many columns, are left out. Raises InputError for rows that a result does not have.
@@ -89,7 +89,7 @@ def _lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
     return {item.dims[0]: len(item.values) for item in variables.values() if item.dims}
 
 
-def _columns(record: Record, name: str, leading: int) -> list[Column]:
+def _columns(record: ExportRecord, name: str, leading: int) -> list[Column]:
     """Return a variable's columns, over its leading dimensions as one: one for each place in the further ones."""
     variable = record.variables[name]
     values = np.asarray(variable.values)
@@ -110,7 +110,7 @@ def _columns(record: Record, name: str, leading: int) -> list[Column]:
     ]
 
 
-def _label(record: Record, dimension: str, index: int) -> str:
+def _label(record: ExportRecord, dimension: str, index: int) -> str:
     """Return the name of a place in a dimension, or its number from 1."""
     named = record.variables.get(dimension)
     if named is not None and np.asarray(named.values).dtype.kind in "UO":

@@ -30,7 +30,7 @@ from vanedamp.files.formats.universal_datasets import (
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.export.export import Option
 from vanedamp.studies.export.formats.vtkhdf import modes_of
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 
 SUMMARY = "modes, receptances, curves and histories: Simcenter Testlab, MATLAB toolboxes, pyuff"
 ENDINGS = (".uff", ".unv")
@@ -50,7 +50,7 @@ _CURVES = {
 _MOST, _MOST_BYTES = 1_000_000, 8e9
 
 
-def modes(record: Record, path: Path) -> None:
+def modes(record: ExportRecord, path: Path) -> None:
     """Write nodes, cells by their corners, and the modes at all nodes, mass-normalised (modal mass 1).
 
     Of a rotating structure with gyroscopic coupling, the complex modes; of a ring, its waves on all sectors.
@@ -77,7 +77,7 @@ def modes(record: Record, path: Path) -> None:
     write_universal(sets, path)
 
 
-def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | None = None) -> tuple[str, ...]:
+def reduced_model(record: ExportRecord, path: Path, frequencies: Sequence[float] | None = None) -> tuple[str, ...]:
     """Write the receptances between all interface coordinates, m/N, at evenly spaced frequencies.
 
     frequencies: first and last (Hz) and their number; left out: 1000 up to the estimate's highest frequency, or 1.5
@@ -114,7 +114,7 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
     return tuple(warnings)
 
 
-def sweep(record: Record, path: Path) -> tuple[str, ...]:
+def sweep(record: ExportRecord, path: Path) -> tuple[str, ...]:
     """Write the amplitude curves of a sweep over its frequencies, m, upwards, one for each of its other points.
 
     Points without a value are left out, since the format has no mark for them; nor has it one for a status. Raises
@@ -149,7 +149,7 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
     return (*warnings, *_troubles(record.values("status").ravel().tolist(), "points"))
 
 
-def response(record: Record, path: Path) -> tuple[str, ...]:
+def response(record: ExportRecord, path: Path) -> tuple[str, ...]:
     """Write the samples of a run: displacements of the response and of the bodies in their cavities, m, over time.
 
     Raises InputError for a response without samples.
@@ -176,7 +176,7 @@ def _troubles(statuses: list[str], what: str) -> tuple[str, ...]:
 WRITERS = {"modes": modes, "ring-modes": modes, "reduced-model": reduced_model, "sweep": sweep, "response": response}
 
 
-def _headers(record: Record) -> list[dict[str, Any]]:
+def _headers(record: ExportRecord) -> list[dict[str, Any]]:
     """Return the datasets 151 (where the file comes from) and 164 (SI units)."""
     from importlib.metadata import version
 
@@ -228,7 +228,7 @@ def _range(frequencies: Sequence[float] | None, top: float) -> tuple[float, floa
     return _rounded(start), _rounded((stop - start) / (number - 1)), int(number)
 
 
-def _top(record: Record, frequencies: np.ndarray, rigid: int) -> float:
+def _top(record: ExportRecord, frequencies: np.ndarray, rigid: int) -> float:
     """Return the highest frequency that a model is for, Hz."""
     provenance: Mapping[str, Any] = record.attributes.get("provenance") or {}
     estimate = provenance.get("estimate") or {}

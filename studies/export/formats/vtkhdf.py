@@ -22,7 +22,7 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.export.export import INPUT, Option
-from vanedamp.studies.export.record import Record, read_record
+from vanedamp.studies.export.record import ExportRecord, read_record
 from vanedamp.studies.ring_mesh import whole_ring, with_parts
 
 SUMMARY = "modes and animated responses on the mesh: ParaView, PyVista"
@@ -49,7 +49,7 @@ class Mesh(NamedTuple):
     cell_type: int
 
 
-def modes(record: Record, path: Path, mode: int | None = None, frames: int | None = None) -> None:
+def modes(record: ExportRecord, path: Path, mode: int | None = None, frames: int | None = None) -> None:
     """Write a field a mode, kg^-0.5; or one mode, `displacement` over `frames` steps of its cycle.
 
     Complex modes, of a rotating structure with gyroscopic coupling and the waves of a ring, on all of its sectors: real
@@ -75,7 +75,9 @@ def modes(record: Record, path: Path, mode: int | None = None, frames: int | Non
     _write_steps(path, mesh, times, ((shape * np.exp(1j * phase)).real for phase in phases))
 
 
-def response(record: Record, path: Path, mesh: str | Path | None = None, periods: int | None = None) -> tuple[str, ...]:
+def response(
+    record: ExportRecord, path: Path, mesh: str | Path | None = None, periods: int | None = None
+) -> tuple[str, ...]:
     """Write the displacements of a reduced model, m, relative to the base, at the samples of the last periods.
 
     Raises InputError for a response without samples of a reduced model's coordinates, a model without its recovery, or
@@ -144,7 +146,7 @@ class ModesOnMesh(NamedTuple):
         return zip(self.names, self.frequencies_hz.tolist(), strict=True)
 
 
-def modes_of(record: Record) -> ModesOnMesh:
+def modes_of(record: ExportRecord) -> ModesOnMesh:
     """Return the modes in a record of `vanedamp modal`, or of `vanedamp ring` on the whole ring. Raises InputError."""
     mesh = _mesh(record)
     if record.kind == "ring-modes":
@@ -173,7 +175,7 @@ def _differ(values: np.ndarray, reference: np.ndarray) -> bool:
     return bool(np.abs(values - reference).max(initial=0.0) > _SAME * np.abs(reference).max(initial=0.0))
 
 
-def _mesh(record: Record) -> Mesh:
+def _mesh(record: ExportRecord) -> Mesh:
     missing = [name for name in ("coordinates", "cell") if name not in record.variables]
     if record.kind not in ("modes", "ring-modes") or missing or "vtk_cell_type" not in record.attributes:
         raise InputError(f"{record.file}: holds no modes with their mesh; `vanedamp modal CASE.toml -o` writes them")

@@ -91,7 +91,7 @@ def _add_times(figure: go.Figure, history: OrbitHistory, row: int) -> None:
     figure.update_yaxes(title={"text": "displacement, µm", "font_size": 12, "standoff": 2}, row=row, col=1)
 
 
-class _Curve(NamedTuple):
+class _StateCurve(NamedTuple):
     """Name and look of a curve, its values (n,), m, and their rates (n,), m/s."""
 
     name: str
@@ -101,13 +101,13 @@ class _Curve(NamedTuple):
     rate: np.ndarray
 
 
-def _curves(states: Sequence[np.ndarray]) -> Iterator[tuple[int, _Curve]]:
+def _curves(states: Sequence[np.ndarray]) -> Iterator[tuple[int, _StateCurve]]:
     """Yield the plane, 0 or 1, and the curve of the structure and of each body; states: as of `add_starts`."""
     displacement, velocity, slip, slip_velocity = states
-    yield 0, _Curve("structure", _STRUCTURE, "solid", displacement, velocity)
+    yield 0, _StateCurve("structure", _STRUCTURE, "solid", displacement, velocity)
     for body, (values, rate) in enumerate(zip(slip.T, slip_velocity.T, strict=True)):
         colour, dash = COLOURS[body % len(COLOURS)], DASHES[body % len(DASHES)]
-        yield 1, _Curve(f"body {body + 1} in its cavity", colour, dash, values, rate)
+        yield 1, _StateCurve(f"body {body + 1} in its cavity", colour, dash, values, rate)
 
 
 def orbits_table(histories: Mapping[str, OrbitHistory]) -> Table:

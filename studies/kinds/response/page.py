@@ -20,7 +20,7 @@ from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_orde
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sector_charts import sectors_shown
 from vanedamp.studies.report.strength import contacts_shown, spots_shown
-from vanedamp.studies.report.time_history import History, history_figure
+from vanedamp.studies.report.time_history import TimeHistory, history_figure
 
 ORDER = 60
 HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
@@ -29,18 +29,18 @@ HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_
 def load(path: Path) -> Result:
     """Read what `vanedamp run` wrote."""
     response = Response.load(path)
-    return Result.of(History.of(response), None if response.scene is None else response.scene.to_dict())
+    return Result.of(TimeHistory.of(response), None if response.scene is None else response.scene.to_dict())
 
 
-def figure(record: History | Response) -> go.Figure:
+def figure(record: TimeHistory | Response) -> go.Figure:
     """Draw the time history. Raises InputError for a run that kept no samples."""
-    history = record if isinstance(record, History) else History.of(record)
+    history = record if isinstance(record, TimeHistory) else TimeHistory.of(record)
     if not len(history.time):
         raise InputError("plot: the run kept no samples; simulate(scene, events=True, samples_per_period=200)")
     return history_figure(history.late())
 
 
-def shown(file: str, history: History, page: Page) -> dict[str, Any]:
+def shown(file: str, history: TimeHistory, page: Page) -> dict[str, Any]:
     """Return the results of a run, its charts and its motion if it was sampled, its impacts if it kept events."""
     energies = history.measures["energy"]
     largest = max(map(abs, energies.values()), default=0.0)
