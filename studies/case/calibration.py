@@ -1,4 +1,4 @@
-"""From measurements to a calibrated case: stiffness, damping, rigid model and excitation, one after the other."""
+"""From measurements to a calibrated case: stiffness, then damping, rigid model and excitation."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from vanedamp.studies.terminal import stage
 _NEAR = 0.1
 # from these on, relative, a warning: distance of the pole from the computed mode, error of the fit
 _OFF, _MISSED = 0.02, 0.1
-#: arrays of a tuning, by their keys in the results for machines
+#: arrays of a tuning, by their keys in the JSON results
 _TUNING = {
     "target_hz": "target_hz", "before_hz": "before_hz", "after_hz": "after_hz", "mode_before": "modes_before",
     "mode_after": "modes_after", "mac_before": "mac_before", "mac_after": "mac_after", "sensitivity": "sensitivities",
@@ -81,13 +81,13 @@ class MeasuredDamping:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A case brought to its measurements.
+    """A case calibrated with its measurements.
 
     analysis  modes of the calibrated case
     rigid     the first bending at the response coordinate, with the calibrated damping ratio
     tuning    None where nothing was tuned
     damping   None where the damping ratio is the case's
-    warnings  what to look at: those of the analysis, and a response that does not look like the first bending's
+    warnings  of the analysis, and of a response that differs from the first bending's
     """
 
     case: Case
@@ -106,7 +106,7 @@ class Calibration:
 
     @property
     def record(self) -> CalibrationRecord:
-        """What the file of the calibration has."""
+        """Content of the calibration file."""
         bending = self.analysis.first_bending
         assert bending is not None
         arrays: dict[str, Any] = {}
@@ -180,9 +180,9 @@ def calibrate(case: Case, checkpoint: str | Path | None = None) -> Calibration:
     """Tune the stiffness if frequencies are given, take the damping from a response if one is given, then calibrate.
 
     checkpoint: a file to which evaluations of the tuning are written and from which an interrupted call resumes; the
-    caller removes it once the result is safe (files.checkpoint_file.clear).
-    Raises InputError for a case without an interface or a first bending, and the errors of the modal package for what
-    cannot be met.
+    caller removes it after the result is saved (files.checkpoint_file.clear).
+    Raises InputError for a case without an interface or a first bending, and the errors of the modal package for data
+    that it cannot reproduce.
     """
     started = time.perf_counter()
     if case.response_label is None:
@@ -190,7 +190,7 @@ def calibrate(case: Case, checkpoint: str | Path | None = None) -> Calibration:
     table = case.calibration or CalibrationTable()
     structure, tuning = assemble(case), None
     if table.tune is not None:
-        # what follows the tuning may be changed before it resumes
+        # tables for later steps may change before the tuning resumes
         tuned = replace(case, calibration=CalibrationTable(tune=table.tune))
         with CaseCheckpoint(checkpoint, "calibrate", tuned, structure.matrices) as memo:
             tuning = _tuned(structure, table.tune, memo.next)
@@ -240,7 +240,7 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
 
 @stage("tuning to the measured frequencies")
 def _tuned(structure: Structure, table: TuneTable, keep: Keep) -> Tuning:
-    """Return what tunes the structure. Raises InputError for an unknown name in `vary`, and for parts that overlap."""
+    """Return the tuning of the stiffness. Raises InputError for unknown names in `vary`, and for overlapping parts."""
     parts = parts_by_name(structure.case, structure.solid.domain.volumes)
     seen: set[str] = set()
     for name in table.vary:
@@ -272,7 +272,7 @@ def _damping(table: DampingTable, frequency: float) -> tuple[MeasuredDamping, li
 
 
 def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) -> Poles:
-    """Return the modes of the band. A refusal names the response's peak and the computed mode."""
+    """Return the modes of the band. If the fit fails, the error names the response's peak and the computed mode."""
     try:
         inside = frf.band(*band)
         poles = identify(inside, count)

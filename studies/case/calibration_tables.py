@@ -59,7 +59,7 @@ class TuneTable:
 
 @dataclass(frozen=True, config=STRICT)
 class CalibrationTable:
-    """The data of `vanedamp calibrate`, besides the case itself."""
+    """The data of `vanedamp calibrate`, in addition to the case itself."""
 
     share: Annotated[Real, Field(gt=0, le=1)] = 0.7
     """fraction of the fatigue strength that the stress reaches at resonance, which sets the excitation [-]"""

@@ -1,4 +1,4 @@
-"""Solutions of a long command on a case, on disk, with which the same command begins after a kill."""
+"""Solutions of a long command on a case, stored on disk so that the same command can resume after a kill."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from vanedamp.studies.case.tables import Case
 
 
 class CaseCheckpoint(CheckpointFile):
-    """Solutions in the order in which a command asks for them (path None: nothing is kept)."""
+    """Solutions in the order in which a command requests them (path None: nothing is stored)."""
 
     def __init__(self, path: str | Path | None, command: str, case: Case, matrices: SystemMatrices) -> None:
-        """Take up the file's solutions. Raises InputError for a file of another case, or one that cannot be read."""
+        """Load the file's solutions. Raises InputError for a file of another case, or one that cannot be read."""
         belongs: dict[str, tuple[str, Mapping[str, Any]]] = {
             "case": ("case", json.loads(json.dumps(tables(case)))),
             "matrices": ("mesh", matrices.provenance),
@@ -32,7 +32,7 @@ class CaseCheckpoint(CheckpointFile):
         }
         super().__init__(path, f"{command}-checkpoint", belongs, self._content)
         self._solutions: list[dict[str, np.ndarray]] = []
-        self._asked, self._kept = 0, path is not None
+        self._requested, self._stores = 0, path is not None
         if (content := self.read()) is not None:
             self._solutions = [{} for _ in content[0]["solution"]]
             for key, values in content[0].items():
@@ -47,12 +47,12 @@ class CaseCheckpoint(CheckpointFile):
         super().__exit__(kind, *rest)
 
     def next(self, solve: Callable[[], Arrays]) -> Arrays:
-        """Return the next solution: the file's, or else that of the function (modal.kept_solutions.Keep)."""
-        self._asked += 1
-        if self._asked <= len(self._solutions):
-            return self._solutions[self._asked - 1]
+        """Return the next solution, from the file or computed by the function (modal.kept_solutions.Keep)."""
+        self._requested += 1
+        if self._requested <= len(self._solutions):
+            return self._solutions[self._requested - 1]
         solution = solve()
-        if self._kept:
+        if self._stores:
             self._solutions.append(dict(solution))
             self.changed()
         return solution

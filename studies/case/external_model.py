@@ -1,4 +1,4 @@
-"""Import of another code's reduced model: a TOML file with the location and meaning of its matrices."""
+"""Import of a reduced model of another code: a TOML file describes where its matrices are and what they mean."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class External:
 
 
 def _check_rows(files: dict[str, Path]) -> None:
-    """Raise InputError for matrices, by key, whose files give their rows to different nodes."""
+    """Raise InputError if the files of matrices, by key, assign their rows to different nodes."""
     rows = {key: freedoms for key, file in files.items() if (freedoms := row_freedoms(file)) is not None}
     for (first, before), (key, after) in itertools.pairwise(rows.items()):
         odd = {tuple(row) for row in before.tolist()} ^ {tuple(row) for row in after.tolist()}
@@ -126,7 +126,7 @@ def _check_rows(files: dict[str, Path]) -> None:
 
 
 def _doubts(model: ReducedModel) -> tuple[str, ...]:
-    """Return a warning when mass or frequency of the first straining mode hint at wrong units."""
+    """Return a warning if the mass or the frequency of the first elastic mode suggests wrong units."""
     first = model.rigid_modes
     if first == model.size:
         return ()

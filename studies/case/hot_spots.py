@@ -1,4 +1,4 @@
-"""Hot spots of a reduced model: where its modes exhaust the material most, and their stresses as outputs."""
+"""Hot spots of a reduced model: where its modes load the material most, and their stresses as outputs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vanedamp.studies.terminal import stage
 
 #: least distance between hot spots over the structure's size
 _APART = 0.05
-# fraction of a strength that counts at least: where the static stress alone exhausts it, nothing is left
+# smallest permissible amplitude as a fraction of the strength: the static stress may already exceed the limit
 _LEFT = 1e-3
 
 
@@ -28,11 +28,11 @@ _LEFT = 1e-3
 def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1) -> ReducedModel:
     """Return the model with stresses at its hot spots as outputs "<spot>.xx" ..., "<spot>" being "hot1", "hot2", ...
 
-    The natural modes of the model at the case's speed have their hot spots in turn, from the lowest one on: the place
-    where the mode's stress is largest over the amplitude that the material permits there upon the static stress
-    (`chosen_places`). Of places with equal stress it is the first. Needs a model with its recovery.
+    Hot spots are assigned to the natural modes of the model at the case's speed, from the lowest mode up: the point
+    with the largest ratio of the mode's stress to the permissible amplitude at the static stress
+    (`chosen_places`). Of points with equal ratios, the first is taken. Needs a model with its recovery.
 
-    Raises InputError for more spots than places, and a case in which no place is left.
+    Raises InputError for more spots than points, and for a case that excludes all points.
     """
     assert model.recovery is not None
     case, solid = structure.case, structure.solid
@@ -61,12 +61,12 @@ def with_hot_spots(structure: Structure, model: ReducedModel, spots: int = 1) ->
 def chosen_places(
     use: np.ndarray, places: np.ndarray, count: int, apart: float
 ) -> tuple[list[tuple[int, int]], np.ndarray]:
-    """Return `count` places with the mode of each, and the fraction (m,) of every mode's largest use that they show.
+    """Return `count` points with the mode of each, and the fraction (m,) of each mode's maximum that they cover.
 
-    use: (m, k) of the strength, by modes in ascending order, at places (k, 3), m; apart: least distance, m.
+    use: (m, k) fraction of the strength, by modes in ascending order, at places (k, 3), m; apart: least distance, m.
 
-    Each place is the one with the largest use of the lowest mode of which the places so far show less than SHOWN; when
-    there is none left, of the first mode. Raises InputError for more places than there are.
+    Each point has the largest use of the lowest mode that is covered by less than SHOWN so far; if all modes are
+    covered, of the first mode. Raises InputError for more points than there are.
     """
     top = use.max(axis=1)
     relative = np.divide(use, top[:, None], out=np.zeros_like(use), where=top[:, None] > 0.0)
@@ -90,7 +90,7 @@ def chosen_places(
 
 
 def excluded_places(structure: Structure) -> np.ndarray:
-    """Return whether stress does not count at places (k,): near excluded groups, and outside of the volumes named."""
+    """Return the mask (k,) of points whose stress does not count: near excluded groups or outside the named volumes."""
     case, solid = structure.case, structure.solid
     excluded = near_groups(solid, structure.matrices, case.hot_spots.exclude)
     within = (case.calibration or CalibrationTable()).hot_spot
@@ -101,7 +101,7 @@ def excluded_places(structure: Structure) -> np.ndarray:
 
 
 def _equivalent(structure: Structure, shape: np.ndarray) -> np.ndarray:
-    """Return the stress (k,), Pa, of a displacement field that counts at every place, by its material's criterion."""
+    """Return the equivalent stress (k,), Pa, of a displacement field by the criterion of the material at each point."""
     solid = structure.solid
     stress = solid.stress_components(shape)
     equivalent = von_mises(stress)
@@ -114,7 +114,7 @@ def _equivalent(structure: Structure, shape: np.ndarray) -> np.ndarray:
 
 
 def _permitted(structure: Structure) -> np.ndarray:
-    """Return the stress amplitude (k,), Pa, that every place bears upon its static stress; ones without strengths."""
+    """Return the permissible stress amplitude (k,), Pa, at the static stress of each point; ones without strengths."""
     case, solid = structure.case, structure.solid
     permitted = np.ones(len(solid.recovery.places))
     static, speed = np.zeros((6, len(permitted))), 0.0 if case.rotation is None else case.rotation.omega
@@ -131,7 +131,7 @@ def _permitted(structure: Structure) -> np.ndarray:
 def _facts(
     structure: Structure, model: ReducedModel, shapes: np.ndarray, picked: list[tuple[int, int]]
 ) -> list[dict[str, Any]]:
-    """Return the facts (rom.recovery.hot_spots) of places, each with its mode, by the modes' shapes (m, N)."""
+    """Return the data (rom.recovery.hot_spots) of points, each with its mode; shapes: (m, N) of the modes."""
     case, solid = structure.case, structure.solid
     points = np.array([point for point, _ in picked])
     groups, recovery = list(solid.domain.volumes), solid.recovery
@@ -160,7 +160,7 @@ def _per_amplitude(
     structure: Structure, model: ReducedModel, shape: np.ndarray, mode: int, point: int
 ) -> dict[str, Any]:
     """Return "error" (relative) of a mode's von Mises stress at a place, and that stress in Pa/m ("von_mises") of a
-    coordinate ("at"): the response coordinate, or else that which the mode moves most; without, if it moves none.
+    coordinate ("at"): the response coordinate, or the one that the mode moves most; neither if it moves none.
     """
     stress = float(von_mises(structure.solid.stress_components(shape, np.array([point])))[0])
     error = float(structure.solid.stress_errors(shape, np.array([point]))[0])

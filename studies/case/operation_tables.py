@@ -1,4 +1,4 @@
-"""The tables of a case about its operation: [rotation], [campbell] and [temperature]."""
+"""The tables of a case for its operating conditions: [rotation], [campbell] and [temperature]."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The interference diagram of a case's ring: its modes, over the speeds of [campbell] if it has such a table."""
+"""The interference diagram of a case's ring: its modes, versus speed if the case has a table [campbell]."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.case.stages import campbell_diagram
 from vanedamp.studies.case.structure import Structure
 
-#: about the speed of [rotation], speeds of operation where nothing says them
+#: relative half width of the operating range around the speed of [rotation], if none is given
 _ABOUT = 0.05
 
 
@@ -31,7 +31,7 @@ def ring_interference(
 
     operating: lowest and highest speed, rad/s, by default those of [campbell], or 5 % about that of [rotation];
     orders: by default those of [campbell], or 1 to the number of sectors; report: called with the number of diameters
-    done, and of all, for the Campbell diagram; checkpoint: of its solutions (campbell_diagram). Raises InputError for
+    done and their total, for the Campbell diagram; checkpoint: as for campbell_diagram. Raises InputError for
     an engine order that is no whole number.
     """
     table, rotation = structure.case.campbell, structure.case.rotation

@@ -1,4 +1,4 @@
-"""A case with its finite elements, as every stage takes it."""
+"""A case with its finite elements, the input of every stage."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Structure:
 
     @cached_property
     def rotating(self) -> RotatingMatrices | None:
-        """Matrices of a case that rotates, up to the highest speed that it names. Errors: as `rotating_to`."""
+        """Matrices of a rotating case, up to its highest speed. Raises the errors of `rotating_to`."""
         rotation, diagram = self.case.rotation, self.case.campbell
         if rotation is None or self.turning is None:
             return None
@@ -34,7 +34,7 @@ class Structure:
         return self.rotating_to(highest)
 
     def rotating_to(self, speed: float) -> RotatingMatrices:
-        """Return the matrices of a case that rotates for speeds up to one (rad/s).
+        """Return the matrices of a rotating case for speeds up to the given one (rad/s).
 
         Raises modal.rotating.UnstableError for a speed without a stable equilibrium.
         """

@@ -60,7 +60,7 @@ class MeshFile:
 
     @property
     def foreign(self) -> bool:
-        """Say whether another program than gmsh wrote it."""
+        """Whether the file was written by another program than gmsh."""
         return not self.file.lower().endswith(".msh")
 
     @property
@@ -78,7 +78,7 @@ class _Generated:
     parameters: Any
 
     def build(self, path: str | Path) -> Path:
-        """Write the mesh. Raises what `build` of its generator in meshes raises."""
+        """Write the mesh. Raises the errors of `build` of its generator in meshes."""
         return _BUILD[self.generator](self.parameters, path)
 
     @classmethod
@@ -226,13 +226,13 @@ def _kind_of_material(table: Any) -> str:
 
 
 def without_strengths(materials: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables below [material] of a case without fatigue strengths and fatigue data."""
+    """Return the tables of [material] without fatigue strengths and fatigue data."""
     plain = {name: dict(table) for name, table in materials.items() if _kind_of_material(table) == "material"}
     return {name: {key: plain[name][key] for key in plain[name] if not key.startswith("fatigue")} for name in plain}
 
 
 def _one_kind(table: Any) -> Any:
-    """Reject a table that is a material and fatigue data."""
+    """Reject a table that mixes a material and fatigue data."""
     if isinstance(table, Mapping) and table.keys() & _MATERIAL_KEYS and (stray := table.keys() & _FATIGUE_KEYS):
         raise ValueError(f"{min(stray)}: is fatigue data; head it [material.<group>.fatigue]")
     return table
@@ -265,7 +265,7 @@ def _least_strength(materials: Mapping[str, MaterialTable]) -> float | None:
 
 
 def _with_fatigue(schema: dict[str, Any]) -> None:
-    """Let the schema of [material] have [material.fatigue] as a table of its own, and materials under other names."""
+    """Let the schema of [material] accept [material.fatigue] as fatigue data, and materials under other names."""
     material, fatigue = schema["additionalProperties"]["oneOf"]
     schema |= {"properties": {"fatigue": fatigue}, "additionalProperties": material}
 
@@ -535,7 +535,7 @@ class Case:
         return {name: (table.own_strength if table else None) or least for name, table in tables.items()}
 
     def without_strength(self, volumes: Iterable[str]) -> list[str]:
-        """Return the volume groups for which the least strength of the others counts; none without any strength."""
+        """Return the volume groups that use the lowest strength of the others; none if there is no strength."""
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
         rated = self.fatigue_strength is not None
         return [name for name, table in tables.items() if rated and (table is None or table.own_strength is None)]
@@ -543,7 +543,7 @@ class Case:
     def fatigue(self, volume: str) -> Fatigue | None:
         """Return the complete fatigue data of a volume group's material; None without any.
 
-        Without a fatigue strength of its own the material has the least of all (`strengths`).
+        A material without a fatigue strength uses the lowest of all (`strengths`).
         """
         table = self.material.get(volume, self.material.get("default"))
         return None if table is None else table.fatigue_data(self.fatigue_strength)
@@ -552,7 +552,7 @@ class Case:
     def response_label(self) -> str | None:
         """The interface coordinate of the rigid model: the one named, the only one, or `shroud`.
 
-        None without any interface. Raises InputError when the choice is open.
+        None without any interface. Raises InputError if the choice is ambiguous.
         """
         if self.modes.at is not None or not self.interface:
             return self.modes.at
@@ -569,7 +569,7 @@ class Case:
 
     @property
     def volume_groups(self) -> set[str]:
-        """Every group of volumes that materials and the ring name; "unnamed" are the elements outside of them."""
+        """Every volume group that materials and the ring name; "unnamed": the elements outside all groups."""
         return {*self.material, *(self.ring.deviating if self.ring is not None else ())} - {"default", "unnamed"}
 
     def check_groups(
@@ -595,7 +595,7 @@ class Case:
         for label, table in self.interface.items():
             for group in table.groups:
                 _check_group(f"interface.{label}.facets", group, groups)
-            # a facet group weighs its nodes by area, others each by one
+            # facet groups weight their nodes by area, other groups equally
             kinds = [kind for kind, names in groups.items() if set(table.groups) & set(names)]
             if "facet" in kinds and len(kinds) > 1:
                 raise InputError(
@@ -629,7 +629,7 @@ def check_interface(case: Case) -> None:
 
 
 def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -> None:
-    """Raise ValueError for materials that no temperature changes, and for two moduli at the reference temperature."""
+    """Raise ValueError if no material depends on temperature, or if moduli at the reference temperature contradict."""
     if not any(table.expansion or table.young_at for table in materials.values()):
         raise ValueError("temperature: changes nothing; give a material its expansion (1/K) or young_at")
     for group, table in materials.items():
@@ -648,7 +648,7 @@ def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -
 
 
 def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) -> None:
-    """Take a file that a key names relative to the case, and see that it is there."""
+    """Resolve a file name relative to the case, and check that the file exists."""
     table: Any = data
     for key in keys[:-1]:
         table = table.get(key) if isinstance(table, dict) else None
@@ -661,7 +661,7 @@ def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) ->
 
 
 def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
-    """Reject mesh tables in words that their union of records does not have."""
+    """Reject wrong mesh tables with clearer messages than those of the union of records."""
     generator, file = mesh.get("generator"), mesh.get("file")
     if (generator is None) == (file is None):
         raise InputError(f"{path}: mesh: give one of file and generator")
