@@ -13,7 +13,7 @@ from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.messages import write_result
 
-#: columns that are printed, and the rows of these
+#: columns that are printed, and number of their rows
 _SHOWN = ("speed", "force", "duration", "pressure", "stiffness_force", "stiffness_duration", "restitution_thornton")
 _EVERY = 4
 

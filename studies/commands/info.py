@@ -1,4 +1,4 @@
-"""`vanedamp info`: what a result is, how it was made, and its main figures."""
+"""`vanedamp info`: kind and origin of a result, and its main values."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _CHECKPOINT = "-checkpoint"
 
 
 def run(arguments: Namespace) -> None:
-    """Print the facts. Raises StoreError for a file that is no record of ours, or damaged."""
+    """Print the facts. Raises StoreError for a damaged file, or one that vanedamp did not write."""
     path = arguments.input
     kind, variables, attributes = load_any(path)
     checkpoint = kind.endswith(_CHECKPOINT)
@@ -44,22 +44,22 @@ def run(arguments: Namespace) -> None:
         facts += [Fact("sizes", {} if checkpoint else _sizes(variables)), Fact("warnings", _warnings(record))]
         result = {"kind": kind} | {fact.key: fact.value for fact in facts} | {"scene": _scene(record)}
         lines = list(fact_lines(f"{path}: {kind}, {what}", facts))
-        json_text(finite(result))  # values of no type that a record of ours has
+        json_text(finite(result))  # fails for types that our records do not contain
     write_result(arguments, result, lines)
 
 
 def _nested(value: Any) -> Any:
-    """Return nested data of its JSON text; any other value as it is."""
+    """Return the data of a JSON text; any other value unchanged."""
     if isinstance(value, str) and value[:1] in "{[":
         try:
             return json.loads(value)
-        except ValueError:  # a text that begins like that
+        except ValueError:  # a text that only begins like JSON
             return value
     return value
 
 
 def _origin(record: Found) -> Iterator[Fact]:
-    """Yield when, by which software and from what input the file was made."""
+    """Yield date, software and input of the file."""
     path, attributes = Path(record.path), record.attributes
     provenance = attributes.get("provenance", {})
     matrices = provenance.get("matrices", attributes.get("matrices"))

@@ -16,7 +16,7 @@ from vanedamp.studies.hot_spots import plus_minus
 
 
 def run(arguments: Namespace, case: Case) -> None:
-    """Compute the modes, and what follows from them."""
+    """Compute the modes and the results derived from them."""
     if arguments.solver is not None:
         case = replace(case, modes=replace(case.modes, solver=arguments.solver))
     analysis = modal_analysis(assemble(case))

@@ -1,6 +1,6 @@
-"""Declaration of a command: arguments, inputs, outputs, and its function, which is loaded last.
+"""Declaration of a command: arguments, inputs, outputs, and its function, which is loaded last,
 
-So whatever a user gets wrong is said before the work's packages are imported, and `--help` loads none of them.
+so that errors of the user are reported before heavy packages are imported, and `--help` loads none of them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def argument(*names: str, **options: Any) -> Argument:
 
 @dataclass(frozen=True)
 class Function:
-    """A function or class at a place, module:name, below studies.commands, which is imported when it is called."""
+    """A function or class module:name below studies.commands, which is imported when it is called."""
 
     place: str
     below: str = "commands"
@@ -44,15 +44,15 @@ class Function:
 class Command:
     """A command of our own.
 
-    NAME, SUMMARY, ORDER  as `studies.commands` says of all commands
+    NAME, SUMMARY, ORDER  as for all commands (`studies.commands`)
     arguments             in the order of --help
     writes                files of options, each with the endings that they may have: checked before anything is read;
                           None: the work checks
     checkpoint            whether the result has a checkpoint, from which `--resume` continues
     reads                 a function of the arguments that loads and checks the input, before the work is loaded
     takes                 kinds of its input files, by their names in `studies.file_kinds`
-    module                whose function `run` does the work, of the arguments and what `reads` returns; "": NAME's
-    job                   in place of it a class of a job, module:name below studies.jobs
+    module                its function `run` takes the arguments and what `reads` returns; "": the module NAME
+    job                   instead of it the class of a job, module:name below studies.jobs
     """
 
     NAME: str

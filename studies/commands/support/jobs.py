@@ -1,4 +1,4 @@
-"""A job by its command: notes before and after it, worker processes, its files, and its checkpoint."""
+"""Run a job from its command: notes before and after it, worker processes, files, and checkpoint."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vanedamp.studies.jobs.workers import available_cores, workers
 
 
 def run(arguments: Namespace, kind: type[Job], *inputs: Any) -> None:
-    """Run the job of a command line, of what the command has read. Raises VanedampError."""
+    """Run the job of a command line on the input that the command has read. Raises VanedampError."""
     job = kind.of_arguments(arguments, *inputs)
     arguments.outputs.keep(job.files)
     count = getattr(arguments, "workers", None)

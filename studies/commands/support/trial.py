@@ -1,6 +1,6 @@
-"""The cost of runs, measured: a few periods of each, within a bounded time, and the rest in proportion.
+"""The cost of runs, extrapolated from a few periods of each that are measured within a bounded time.
 
-No formula knows how many events bodies, contact laws and modes make of a period.
+No formula predicts the number of events per period from bodies, contact laws and modes.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def mean_cost(scenes: Sequence[Scene], begins: float = RUN) -> float:
 
 
 def tried(count: int) -> list[int]:
-    """Return the numbers of those of `count` scenes that stand for all: one of each part, at no regular distance."""
+    """Return the indices of scenes that represent all `count`: one at a random position in each of equal intervals."""
     if count <= _SCENES:
         return list(range(count))
     positions = (np.arange(_SCENES) + np.random.default_rng(0).random(_SCENES)) * count / _SCENES
@@ -60,9 +60,9 @@ def tried(count: int) -> list[int]:
 def _cost(scene: Scene, seconds: float) -> float:
     """Return the processor time of the periods of a run, s, from a trial of about `seconds`.
 
-    A run that takes longer is tried from near its steady state: little happens while it begins. Where contacts close in
-    a new combination, the exact engines assemble a subsystem. A second trial, which has them all, tells this cost,
-    which grows as a power of the periods as combinations return, from that of the motion.
+    A longer run is tried from near its steady state, since few events occur at its beginning. Where contacts close in
+    a new combination, the exact engines assemble a contact configuration. A second trial, in which all are assembled,
+    separates this cost, a power of the number of periods as combinations recur, from that of the motion.
     """
     periods = scene.time.simulated
     whole = _follow(run_of(scene), periods, 0.3 * seconds)
