@@ -1,4 +1,4 @@
-"""The claims that the demonstration judges, and how: rules on results, in words of our own.
+"""The claims that the demonstration tests: rules on results, in our own words.
 
 Where a claim holds in part or not, `why` names the cause in the model. Amplitudes are relative to the undamped
 maximum.

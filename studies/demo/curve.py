@@ -1,4 +1,4 @@
-"""A damped curve over frequencies as claims read it: smoothed means, maxima, scatter, onset."""
+"""A damped curve versus frequency, evaluated for claims: smoothed means, maxima, scatter, onset."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vanedamp.studies.report.forced_response import ForcedResponse, forced_respo
 
 #: standard deviation of the smoothing, in points: frequencies are denser where the curves are steeper
 _SMOOTHING = 1.5
-#: a damped response within this fraction of the one without bodies has not been touched by the bodies
+#: below this relative difference from the curve without bodies, bodies count as not involved
 _UNTOUCHED = 0.01
 
 
@@ -90,7 +90,7 @@ class DampedCurve:
 
     @property
     def scatter(self) -> dict[str, float]:
-        """Root mean square distance of maxima and means from their smoothed curves where there are impacts."""
+        """Root mean square distance of maxima and means from their smoothed curves at points with impacts."""
         hit = self.impacts > 0
         if not hit.any():
             return {"largest": 0.0, "mean": 0.0}

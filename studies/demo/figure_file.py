@@ -67,8 +67,8 @@ class FigureStructure:
     def unit(self, name: str) -> float:
         """Return a unit: a field's value, `force` at the undamped resonance (N), or `inertia` of the mass there (N).
 
-        `speed` (rad/s) is the one at which a revolution takes a period of the rigid model, `impedance` (N s/m) its mass
-        times that.
+        `speed` (rad/s): one revolution per period of the rigid model; `impedance` (N s/m): its mass
+        times this speed.
         """
         speed = 2 * math.pi * self.frequency
         values = {
@@ -194,7 +194,7 @@ def _damping_ratio(scene: Scene) -> float:
 
 
 def _scaled(data: Any, structure: FigureStructure) -> Any:
-    """Return data with its quantities as numbers."""
+    """Return data with quantities such as "0.5 amplitude" replaced by numbers."""
     if isinstance(data, dict):
         return {key: _scaled(value, structure) for key, value in data.items()}
     if isinstance(data, list):
@@ -212,7 +212,7 @@ def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
-    """Return tables with counted cavities and bodies spelt out; single ones start aside, each in its own place."""
+    """Return tables with counted cavities and bodies written out; single bodies start at different positions."""
     cavities, names = [], {}
     for table in tables.get("cavity", []):
         count = table.get("count")

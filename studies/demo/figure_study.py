@@ -54,7 +54,7 @@ class Session:
         return FigureScenes.load(file, self.structure, self.effort)
 
     def read(self, sweep: Sweep, name: str) -> list[DampedCurve]:
-        """Return the curves of a sweep, each the worst over the starts of the effort."""
+        """Return the curves of a sweep, each the worst of the effort's starts."""
         lines, starts = curves(sweep, name), [] if self.effort is None else [STARTS[key] for key in self.effort.starts]
         if not starts:
             return lines
@@ -96,7 +96,7 @@ def draw_first(read: Read, path: Path) -> None:
 
 
 class FigureStudy(NamedTuple):
-    """How a figure is judged and drawn. file: of its scenes."""
+    """How a figure is evaluated and drawn. file: of its scenes."""
 
     file: Path
     claims: Callable[[Read], list[Claim]]
@@ -127,7 +127,7 @@ def provenance(scene: Scene) -> dict[str, Any]:
 
 
 def _trouble(curve: str, sweep: Sweep) -> list[str]:
-    """Return how many points of a curve have which status other than ok, in words."""
+    """Return the numbers of points that are not ok, by status, in words."""
     counts = Counter(status for status in sweep.status.ravel().tolist() if status != "ok")
     name = curve.replace("_", " ")
     return [f"{name} {count} of {sweep.status.size} {status}".strip() for status, count in counts.items()]
