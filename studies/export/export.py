@@ -1,4 +1,4 @@
-"""Export of results: the format follows the file's ending, the writer the kind of the result."""
+"""Export of results: the file's ending sets the format, the kind of the result the writer."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class Format(Protocol):
 def export(result: str | os.PathLike[str] | Saved, path: str | os.PathLike[str], **options: Any) -> tuple[str, ...]:
     """Write a result, or a file's result, to a file of another program, whose ending names the format.
 
-    options: the format's, such as `table="events"` of a .csv (docs/exchange.md). Returns warnings: what the
-    file does not hold. Raises InputError for an unknown ending, a format that cannot hold this kind of result, or
-    an option that is not for it, StoreError for a file that cannot be read or written.
+    options: of the format, such as `table="events"` of a .csv (docs/exchange.md). Returns warnings of data that the
+    file cannot hold. Raises InputError for an unknown ending, a format that cannot hold this kind of result, or
+    an unsuitable option, StoreError for a file that cannot be read or written.
     """
     chosen = format_of(path)
     return write(read_record(result), chosen, path, options)
@@ -107,5 +107,5 @@ class Option:
 
     @property
     def count(self) -> int | None:
-        """Number of values in the command line; None: one that is no list."""
+        """Number of values on the command line; None: a single value."""
         return len(self.metavar) if isinstance(self.metavar, tuple) else None

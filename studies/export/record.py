@@ -1,4 +1,4 @@
-"""Records of any kind with their dimensions and units, as formats take them."""
+"""Records of any kind with their dimensions and units, the input of formats."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Saved(Protocol):
 
 
 class ExportRecord(NamedTuple):
-    """A record: the file or object it is of, its name, kind, variables by name, and attributes as plain data."""
+    """A record: its file or object, file name, kind, variables by name, and attributes as plain data."""
 
     source: Any
     file: str

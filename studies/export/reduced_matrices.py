@@ -1,4 +1,4 @@
-"""Matrices of reduced models for files of other codes, and the file by which `vanedamp import` reads them back."""
+"""Matrices of reduced models in files of other codes, and the description with which `vanedamp import` reads them."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ COORDINATES = Option(
     "coordinates", "of a reduced model's matrices: own, the first of which are the interface's (default), or natural "
     "modes, which lose nothing to the digits of a text", "own|natural",
 )  # fmt: skip
-#: of a format: writes matrices of a model by name to a file; returns the names in the file
+#: function of a format: writes matrices of a model by name to a file; returns the names in the file
 Writer = Callable[[Path, ReducedModel, Mapping[str, np.ndarray]], dict[str, str]]
-#: change of natural frequencies by the digits of a text that is reported
+#: relative change of natural frequencies by rounding in a text file that is reported
 _NOTABLE = 1e-9
 
 
@@ -64,7 +64,7 @@ def _model_in(record: ExportRecord, coordinates: str | None) -> ReducedModel:
 
 
 def _lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> tuple[str, ...]:
-    """Return a warning where the digits of a text file change the natural frequencies of the model in it."""
+    """Return a warning if rounding in a text file changes the natural frequencies of its model."""
     matrices = read_matrices(file)
     rows = dict(zip(model.interface, plain_matrices(model)["selection"], strict=True))
     again, _ = external_model(matrices[names["mass"]], matrices[names["stiffness"]], rows, damping_ratio=0.0)
@@ -78,7 +78,7 @@ def _lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> t
 
 
 def _left_out(model: ReducedModel, damping: bool, base_load: bool) -> tuple[str, ...]:
-    """Return what files of mass, stiffness and, perhaps, damping and base load do not say of a model."""
+    """Return warnings of properties that files of mass, stiffness and perhaps damping and base load omit."""
     lacks = []
     if not damping and model.damping_ratio is None and np.any(model.damping):
         lacks.append("the damping matrix: this format holds none, and the model has no damping ratio")

@@ -1,4 +1,4 @@
-"""The formats that results are exported to: each file of this folder is one, and other packages add theirs.
+"""Formats for export of results: one per file of this folder; other packages can add more.
 
 A format is a module with
 

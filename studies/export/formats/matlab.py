@@ -22,7 +22,7 @@ ENDINGS = (".mat",)
 OPTIONS = (DESCRIPTION,)
 #: bytes of a variable, and letters of a name, that version 5 holds
 _MOST_BYTES, _MOST_LETTERS = 2**31 - 1, 63
-#: texts of a variable that are cells; of more, which would take minutes to read and write, numbers in a list of words
+#: largest number of texts written as cells; more would take minutes and are written as indices in a list of words
 _MOST_CELLS = 10_000
 _RESERVED = {"case", "catch", "end", "function", "otherwise", "parfor", "persistent", "spmd", "switch"}
 
@@ -93,7 +93,7 @@ def _texts(values: np.ndarray) -> np.ndarray:
 
 
 def _struct(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return plain data as a struct; one without fields has one, since scipy writes none."""
+    """Return plain data as a struct; an empty one gets a field, since scipy writes no empty structs."""
     return dict(_unique((name, _value(value)) for name, value in data.items())) or {"none": np.zeros((0, 0))}
 
 
@@ -116,7 +116,7 @@ def _cells(items: list[Any]) -> np.ndarray:
 
 
 def _unique(items: Iterable[tuple[str, Any]]) -> Iterable[tuple[str, Any]]:
-    """Yield items under names that MATLAB takes, each once."""
+    """Yield items under valid and unique MATLAB names."""
     used: set[str] = set()
     for name, value in items:
         short = unique = _name(name)
@@ -129,7 +129,7 @@ def _unique(items: Iterable[tuple[str, Any]]) -> Iterable[tuple[str, Any]]:
 
 
 def _name(text: str) -> str:
-    """Return a name as MATLAB takes it: letters, digits and underscores, a letter first, no keyword."""
+    """Return a valid MATLAB name: letters, digits and underscores, a letter first, no keyword."""
     name = re.sub(r"[^0-9A-Za-z_]", "_", text)
     if not name or not name[0].isalpha() or iskeyword(name) or name in _RESERVED:
         name = f"x_{name.lstrip('_')}"

@@ -1,4 +1,4 @@
-"""Tidy tables: one row per point of a sweep, sample, period, event, mode ...; units stand in the header."""
+"""Tidy tables: one row per point of a sweep, sample, period, event, mode ...; units are in the header."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _TABLES = {
 }  # fmt: skip
 #: dimension of the Poincare sections of a sweep
 _SECTION = "section"
-#: rows that are made at once, and columns that a variable may have
+#: rows per write, and largest number of columns per variable
 _CHUNK, _MOST_COLUMNS = 4096, 1000
 
 Column = tuple[str, np.ndarray]
 
 
 def sweep(record: ExportRecord, path: Path, table: str | None = None) -> None:
-    """Write the grid of a sweep: a row a point, columns of its axes, statuses and measures.
+    """Write the grid of a sweep: one row per point, with columns of axes, statuses and measures.
 
     table: "section" has a row for each Poincare section of every point instead. Raises InputError for other rows, and
     for sections that the sweep has not kept.
@@ -65,7 +65,7 @@ def sweep(record: ExportRecord, path: Path, table: str | None = None) -> None:
 
 
 def table(record: ExportRecord, path: Path, table: str | None = None) -> tuple[str, ...]:
-    """Write the variables over one dimension: a row an entry, further dimensions as columns of their own.
+    """Write the variables of one dimension: one row per entry; further dimensions become columns.
 
     Fields, which would be too many columns, are left out. Raises InputError for rows that a result does not have.
     """
@@ -90,7 +90,7 @@ def _lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
 
 
 def _columns(record: ExportRecord, name: str, leading: int) -> list[Column]:
-    """Return a variable's columns, over its leading dimensions as one: one for each place in the further ones."""
+    """Return a variable's columns: rows are its leading dimensions, with a column per index of the others."""
     variable = record.variables[name]
     values = np.asarray(variable.values)
     rows, further = math.prod(values.shape[:leading]), values.shape[leading:]
@@ -111,7 +111,7 @@ def _columns(record: ExportRecord, name: str, leading: int) -> list[Column]:
 
 
 def _label(record: ExportRecord, dimension: str, index: int) -> str:
-    """Return the name of a place in a dimension, or its number from 1."""
+    """Return the name of an index of a dimension, or its number from 1."""
     named = record.variables.get(dimension)
     if named is not None and np.asarray(named.values).dtype.kind in "UO":
         return str(named.values[index])

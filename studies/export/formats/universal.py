@@ -1,6 +1,6 @@
 """Universal files of test systems: modes on their mesh (datasets 2411, 2412, 55), curves and histories (58).
 
-SI units and the global frame, as datasets 164 says. Datasets 55 and 58 hold six digits of shapes, frequencies and steps
+SI units and the global frame (dataset 164). Datasets 55 and 58 hold six digits of shapes, frequencies and steps
 of time, twelve of curves: the curves of a reduced model are those at the frequencies that the file holds.
 """
 
@@ -213,7 +213,7 @@ def _curve(
 
 
 def _range(frequencies: Sequence[float] | None, top: float) -> tuple[float, float, int]:
-    """Return the first frequency, the step and the number of frequencies that a file holds exactly."""
+    """Return first frequency, step and number of frequencies, rounded to values that the file holds exactly."""
     if frequencies is None:
         step = _rounded(top / 1000.0, 2)
         return step, step, 1000
@@ -245,7 +245,7 @@ def _direction(direction: np.ndarray) -> int:
 
 
 def _rounded(value: float, digits: int = 5) -> float:
-    """Return a number in the digits that the file has behind the point."""
+    """Return a number rounded to the decimals of the file."""
     return float(f"{value:.{digits}e}")
 
 
@@ -258,5 +258,5 @@ def _short(name: str) -> str:
 
 
 def _ascii(text: str) -> str:
-    """Return a text in the letters that the format has."""
+    """Return a text in the characters of the format."""
     return text.encode("ascii", "replace").decode()

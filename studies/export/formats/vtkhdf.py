@@ -37,7 +37,7 @@ OPTIONS = (
 )
 #: bytes of the fields of a file
 _MOST_BYTES = 8e9
-#: by which displacements from the coordinates may differ from the samples of the run, of their largest
+#: tolerance of displacements from the coordinates against samples of the run, relative to the largest
 _SAME = 1e-6
 
 
@@ -50,10 +50,10 @@ class Mesh(NamedTuple):
 
 
 def modes(record: ExportRecord, path: Path, mode: int | None = None, frames: int | None = None) -> None:
-    """Write a field a mode, kg^-0.5; or one mode, `displacement` over `frames` steps of its cycle.
+    """Write one field per mode, kg^-0.5; or one mode, `displacement` over `frames` steps of its cycle.
 
     Complex modes, of a rotating structure with gyroscopic coupling and the waves of a ring, on all of its sectors: real
-    and imaginary parts as fields, or animated as Re(shape exp(i phase)). Raises InputError for a mode that is not there
+    and imaginary parts as fields, or animated as Re(shape exp(i phase)). Raises InputError for a mode out of range
     and too few frames.
     """
     mesh_modes = modes_of(record)
@@ -130,7 +130,7 @@ WRITERS = {"modes": modes, "ring-modes": modes, "response": response}
 
 
 class ModesOnMesh(NamedTuple):
-    """The modes of a record: their mesh, frequencies (m,), names, and a function of a mode's place: shape (n, 3).
+    """The modes of a record: mesh, frequencies (m,), names, and the function that returns the shape (n, 3) by index.
 
     The shapes are complex where the record has those with the gyroscopic coupling, and of waves of a ring.
     """
@@ -165,7 +165,7 @@ def modes_of(record: ExportRecord) -> ModesOnMesh:
 
 
 def _chosen(structure: Any, estimate: Mapping[str, Any] | None) -> Any:
-    """Return the structure with the number of modes that the run chose, if it was open."""
+    """Return the structure with the number of modes that the run has chosen for `modes = "auto"`."""
     if structure.modes != "auto" or estimate is None:
         return structure
     return replace(structure, modes=int(estimate["modes"]), natural=True, attached=bool(estimate["attached"]))
@@ -221,7 +221,7 @@ def _check_size(fields: int, nodes: int, remedy: str) -> None:
 
 @contextmanager
 def _file(path: Path, mesh: Mesh) -> Iterator[Any]:
-    """Give the group of a new file that has the mesh as one part; the file is written at the end."""
+    """Yield the group of a new file with the mesh as one part; the file is written at the end."""
     image = io.BytesIO()  # a write that fails within HDF5 ends the whole process
     with h5py.File(image, "w") as file:
         root = file.create_group("VTKHDF")
