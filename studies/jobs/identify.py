@@ -22,7 +22,7 @@ from vanedamp.studies.jobs.job import Job, JobResult, Means
 
 @dataclass(frozen=True)
 class IdentifyJob(Job):
-    """Finds numbers of a scene; budget: s, by default the study's."""
+    """Finds numbers of a scene; budget: s, by default that of the study."""
 
     study: IdentificationStudy
     budget: float | None = None

@@ -1,4 +1,4 @@
-"""`vanedamp optimise`: mass, gap and number of bodies that reduce most, as designed and within tolerances."""
+"""`vanedamp optimise`: mass, gap and number of bodies with the largest reduction, nominal and within tolerances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`vanedamp orbits`: periodic orbits over a number of the scene; points found are kept and survive a kill."""
+"""`vanedamp orbits`: periodic orbits versus a scene parameter; points found are stored and survive a kill."""
 
 from __future__ import annotations
 

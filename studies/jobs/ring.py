@@ -1,4 +1,4 @@
-"""`vanedamp ring`: modes of a ring by nodal diameter, and the engine orders that meet them."""
+"""`vanedamp ring`: modes of a ring by nodal diameter, and the engine orders that excite them."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class RingJob(Job):
         )  # fmt: skip
 
     def _study(self, structure: Structure, diagram: Interference) -> tuple[MistuningStudy, list[str]]:
-        """Return the amplification over draws, of the orders named, or one for each diameter from 1; and doubts.
+        """Return the amplification over draws, for the named orders or one per diameter from 1; and warnings.
 
         Raises InputError for a case without an interface, and RingError.
         """
@@ -107,7 +107,7 @@ class RingJob(Job):
 
 
 def _files(structure: Structure, diagram: Interference) -> dict[str, Write]:
-    """Return by its option what writes a file of the modes."""
+    """Return the functions that write files of the modes, by their options."""
 
     def save(path: str) -> None:
         mesh, cell_type = structure.mesh()

@@ -29,7 +29,7 @@ class RingDownJob(SceneJob):
 
     @classmethod
     def check_scene(cls, scene: Scene, source: str) -> None:
-        """Raise InputError for a scene without [ring_down]; nothing else need move it."""
+        """Raise InputError for a scene without [ring_down]; no other excitation is required."""
         check_numbers(scene, source)
         table_of(scene)
 

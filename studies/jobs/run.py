@@ -24,7 +24,7 @@ class RunJob(SceneJob):
     """Runs a scene.
 
     events: keep the list of events; samples: per period that are kept; exponents: periods of Lyapunov exponents;
-    moved_start: compare with a second run, from bodies a little aside.
+    moved_start: compare with a second run that starts with bodies slightly displaced.
     """
 
     events: bool = False
@@ -73,7 +73,7 @@ class RunJob(SceneJob):
 
 
 def _summary(response: Response, result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the figures of a run, its stresses, exponents, sectors, contacts and wear, and last a status not ok."""
+    """Yield the results of a run, with stresses, exponents, sectors, contacts and wear, and last a status not ok."""
     of = units()
     for name, value in result.items():
         if not isinstance(value, dict | list):

@@ -1,4 +1,4 @@
-"""`vanedamp sweep`: a run at every point of a grid; finished points are kept in a file and survive a kill."""
+"""`vanedamp sweep`: a run at every point of a grid; finished points are stored in a file and survive a kill."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ _MOST_LINES = 12
 class SweepJob(SceneJob):
     """Runs a scene at every point of its sweep.
 
-    peak: the name of a file for the point with the highest mean, which runs once more with events and samples;
-    moved_starts: run the peak of each curve from bodies a little aside as well; provenance: further data of the result.
+    peak: file for the point with the highest mean, which is run again with events and samples;
+    moved_starts: also run the peak of each curve with displaced bodies; provenance: further data of the result.
     """
 
     peak: str | None = None
@@ -70,7 +70,7 @@ class SweepJob(SceneJob):
 
     @cached_property
     def points(self) -> Grid:
-        """The grid. Raises InputError for a point that is no scene, and for a peak that cannot run by itself."""
+        """The grid. Raises InputError for a point that is no scene, and for a peak that needs a neighbour's state."""
         points = grid(self.of)
         if self.peak is not None:
             self.of.solver.check_samples(PEAK_SAMPLES)
@@ -104,7 +104,7 @@ class SweepJob(SceneJob):
         return ends_of(self.points)
 
     def work(self, means: Means) -> JobResult:
-        """Run every point that is not done, and once more the one with the highest mean."""
+        """Run all unfinished points, and the point with the highest mean again."""
         resumed, points = self.finished(means.checkpoint), self.points
         provenance = means.provenance | dict(self.provenance)
         result = sweep(points, means.pool, means.report, means.checkpoint, provenance, self.moved_starts)
@@ -132,8 +132,8 @@ class SweepJob(SceneJob):
 def peak(points: Grid, result: Sweep, path: str) -> tuple[str, dict[str, Write]]:
     """Run the point with the highest mean of those that are ok, with events and samples.
 
-    Points that began with the state of a neighbour do not count, as they would end in another motion. Returns what to
-    say of it, with the name of its file (path), and by the option `peak` what writes that, if
+    Points that began with the state of a neighbour do not count, as a single run would end in another motion. Returns a
+    note with the name of its file (path), and by the option `peak` the function that writes the file, if
     there is such a point.
     """
     mean = np.where(result.status == "ok", result.amplitude_mean_dynamic, -np.inf)
