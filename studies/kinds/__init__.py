@@ -1,4 +1,4 @@
-"""The kinds of results: each folder here is one, and what is known of it stands there.
+"""The kinds of results: each folder here is one and holds everything about it.
 
 A kind is a folder named like the attribute `kind` of its HDF5 files (with _ for -), whose `__init__` has
 
@@ -13,7 +13,7 @@ and whose `page.py`, which draws, has
     load(path)                read a file; returns a studies.report.results.Result. Without: by `load` of RECORD
     shown(file, record, page) what page.html shows of a result, of which its `section` is the list; page: a
                               studies.report.page.Page, which makes the charts
-    section(results, page)    in place of it, of all results of the kind by the path of their file
+    section(results, page)    instead of `shown`, for all results of the kind by the path of their file
     ORDER                     place on the page
     figure(record)            what `vanedamp.plot` shows of the record that `load` read, or that a command returns
 

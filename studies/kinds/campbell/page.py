@@ -14,7 +14,7 @@ from vanedamp.studies.report.page import Page
 
 ORDER = 40
 _ORDER, _MARK = "#64748b", "#111827"
-#: of modes beyond the colours
+#: of modes when all colours are used
 _DASHES = ("solid", "dot", "dashdot")
 
 
@@ -29,7 +29,7 @@ def shown(file: str, diagram: Campbell, page: Page) -> dict[str, Any]:
 
 
 def figure(diagram: Campbell) -> go.Figure:
-    """Draw the modes as they are followed over the speed, engine-order lines, crossings and veerings."""
+    """Draw the modes versus speed, engine-order lines, crossings and veerings."""
     figure = go.Figure()
     top = 1.06 * float(np.nanmax(diagram.frequencies_hz))
     _add_orders(figure, diagram, top)
@@ -103,6 +103,6 @@ def _add_veerings(figure: go.Figure, diagram: Campbell) -> None:
 
 
 def campbell_table(diagram: Campbell) -> Table:
-    """Return the frequencies of the modes, a row per speed."""
+    """Return the frequencies of the modes, one row per speed."""
     header = ["speed, rad/s", "speed, rpm", *(f"{diagram.label(mode)}, Hz" for mode in diagram.modes)]
     return header, np.column_stack([diagram.speeds, diagram.rpm, diagram.frequencies_hz.T]).tolist()

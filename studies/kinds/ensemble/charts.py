@@ -16,13 +16,13 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
 
-#: place of a curve: an index of each axis, of the one along which it runs all
+#: position of a curve in the grid: an index per axis, all along the curve's own axis
 Place = tuple[Any, ...]
 #: quantiles of both bands, and the look of each
 _BANDS = ((0, 4, "5 to 95 %", 0.18), (1, 3, "25 to 75 %", 0.3))
 _BLUE = "29, 79, 145"
 _WITHOUT = {"color": "#334155", "dash": "dot"}
-#: panels of indices side by side
+#: columns of panels of indices
 _COLUMNS = 2
 
 
@@ -34,7 +34,7 @@ def along(record: Ensemble) -> str | None:
 
 
 def places(record: Ensemble) -> list[Place]:
-    """Return the places of all curves, () of one frequency."""
+    """Return the grid positions of all curves; () for a single frequency."""
     axis = along(record)
     return list(itertools.product(*([slice(None)] if path == axis else range(n) for path, n in _lengths(record))))
 
@@ -44,7 +44,7 @@ def _lengths(record: Ensemble) -> list[tuple[str, int]]:
 
 
 def title(record: Ensemble, place: Place) -> str:
-    """Return the values of the other axes of a curve."""
+    """Return a title with the values of the other axes of a curve."""
     pairs = zip(record.axes.items(), place, strict=True)
     return ", ".join(f"{path} = {values[index]}" for (path, values), index in pairs if not isinstance(index, slice))
 
@@ -105,7 +105,7 @@ def bar_names(record: Ensemble) -> list[str]:
 
 
 def has_bars(record: Ensemble) -> bool:
-    """Whether each curve has a reduction of its own, in place of one at each of its points."""
+    """Whether a reduction belongs to each curve, not to each of its points."""
     return not record.axes or along(record) not in record.curves
 
 

@@ -13,7 +13,7 @@ from vanedamp.studies.identification.record import Identification, Proposal
 from vanedamp.studies.report.charts import COLOURS, axis_title
 
 _PALE, _BAND = "#94a3b8", "rgba(29, 79, 145, 0.18)"
-#: panels side by side, and how far apart, as a fraction of the width: the titles of their axes lie between
+#: columns of panels, and their distance as a fraction of the width, with space for axis titles
 _COLUMNS, _APART = 3, 0.13
 #: rise of the misfit beyond which a profile is not drawn, over the threshold
 _HIGH = 3.0
@@ -57,7 +57,7 @@ def data_figure(record: Identification) -> go.Figure:
 
 
 def profile_figure(record: Identification) -> go.Figure:
-    """Draw the rise of the misfit along every number, the others at their best, and where its interval ends."""
+    """Draw the rise of the misfit versus each number, the others at their optimum, and the ends of its interval."""
     count = len(record.paths)
     columns = min(count, _COLUMNS)
     figure = make_subplots(
@@ -100,7 +100,7 @@ def correlation_figure(record: Identification) -> go.Figure:
 
 
 def proposal_figure(record: Identification, proposal: Proposal) -> go.Figure:
-    """Draw what is left of the worst number's uncertainty after each further measurement, a line per level."""
+    """Draw the remaining uncertainty of the worst number after each further measurement, one line per level."""
     figure, last = go.Figure(), len(proposal.axes) - 1
     levels = list(dict.fromkeys(map(tuple, proposal.points[:, :last].tolist())))
     for number, level in enumerate(levels):

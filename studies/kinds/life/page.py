@@ -1,4 +1,4 @@
-"""Lives of dampers: how long they damp, and wear, gaps and reduction over hours."""
+"""Service lives of dampers: hours, and wear, gaps and reduction versus time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Borders over two numbers, as lines over the colours of a sweep."""
+"""Borders in the plane of two parameters, drawn over the map of a sweep."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _LINES = {
 }  # fmt: skip
 #: symbols of named points, in the order of their names
 _SYMBOLS = ("circle", "square", "diamond", "triangle-up", "star", "pentagon", "triangle-down", "cross", "hexagon")
-#: named points without a mark of their own: the sequence of events changes, and the border goes on
+#: named points without a marker: the sequence of events changes, and the border continues
 _PLAIN = ("sequence",)
 
 
 def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
-    """Draw the borders of branches over their two numbers, over the map of a sweep (`map_of`) if there is one.
+    """Draw the borders of branches in the plane of their two parameters, over the map of a sweep (`map_of`), if any.
 
     Solid where stable orbits meet, dashed where all are unstable; named points are marked.
     """
@@ -67,7 +67,7 @@ def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
 
 
 def _add_points(figure: go.Figure, branches: Branches, wide: float, high: float) -> None:
-    """Mark the named points, a symbol per kind."""
+    """Mark the named points, one symbol per kind."""
     points_of_kind: dict[str, list[tuple[BorderPoint, str]]] = {}
     for number, border in enumerate(branches.borders):
         for point in border.special:
@@ -87,7 +87,7 @@ def _add_points(figure: go.Figure, branches: Branches, wide: float, high: float)
 
 
 def _sides(border: Border) -> list[str]:
-    """Return in words how many orbits meet at each point of a border."""
+    """Return the numbers of orbits on both sides of each point of a border, in words."""
     return [
         f"below {few} orbits, {fewer} stable; above {many} orbits, {more} stable"
         for (few, many), (fewer, more) in zip(border.orbits.tolist(), border.stable_orbits.tolist(), strict=True)
@@ -97,7 +97,7 @@ def _sides(border: Border) -> list[str]:
 def map_of(branches: Branches, sweep: Sweep) -> Panel | None:
     """Return the relative mean amplitudes of a sweep over the two numbers of the borders of its scene; None without.
 
-    Its other axes must be starts, of which the first is taken.
+    Its other axes must be starts; the first start is used.
     """
     two, paths = (branches.parameter, branches.second), list(sweep.axes)
     other_paths = [path for path in paths if path not in two]
@@ -120,7 +120,7 @@ def maps_of(branches: Branches, sweeps: Mapping[str, Sweep]) -> dict[str, Panel]
 
 
 def borders_table(branches: Branches) -> Table:
-    """Return a row per point, borders counted from 0, in SI units."""
+    """Return one row per point, borders counted from 0, in SI units."""
     rows, names = [], [name for name in branches.scalars if all(name in curve.quantities for curve in branches.borders)]
     for number, border in enumerate(branches.borders):
         columns = np.column_stack([border.parameter, border.second, *(border.quantities[name] for name in names)])

@@ -15,14 +15,14 @@ from vanedamp.studies.report.charts import COLOURS, DASHES, Table, dressed
 
 _STRUCTURE, _IMPACT = "#0f172a", "#d55e00"
 _ROW = 330  # pixels
-#: of panels side by side, over the width: room for ticks and a title on a page of 800 pixels
+#: distance of panels, relative to the width: space for ticks and a title on a page of 800 pixels
 _APART = 0.13
 #: periods that are drawn, and starts of periods
 _PERIODS, _MOST_STARTS = 25, 2000
 
 
 def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
-    """Draw a row an orbit, by its name: displacements over the time, and the phase planes."""
+    """Draw one row per orbit, by its name: displacements versus time, and the phase planes."""
     bodies = any(history.slip.shape[1] for history in histories.values())
     rows = len(histories)
     figure = make_subplots(
@@ -42,7 +42,7 @@ def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
 
 
 def add_planes(figure: go.Figure, history: OrbitHistory, row: int, col: int) -> None:
-    """Draw the phase plane of the structure into a column of a row, and the bodies' into the next."""
+    """Draw the phase plane of the structure into a column of a row, and that of the bodies into the next."""
     states = (history.displacement, history.velocity, history.slip, history.slip_velocity)
     for column, curve in _curves(states):
         figure.add_scatter(
@@ -124,7 +124,7 @@ def orbits_table(histories: Mapping[str, OrbitHistory]) -> Table:
 def phase_figure(response: Response) -> go.Figure:
     """Draw the phase planes of structure and bodies, with a point at the start of each of the evaluated periods.
 
-    A motion that repeats after k periods has k points, one that never does fills an area. response: with samples and
+    A motion that repeats after k periods has k points, a non-periodic one fills an area. response: with samples and
     events.
     """
     history = late_history(response, _PERIODS)

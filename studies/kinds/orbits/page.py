@@ -1,4 +1,4 @@
-"""Branches of periodic orbits: over their parameter and the sweeps' points, their multipliers, and orbits on them."""
+"""Branches of periodic orbits versus their parameter, with points of sweeps, Floquet multipliers and orbits."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ _SYMBOLS = {
     "grazing": "x-thin", "sequence": "cross-thin", "end": "line-ns",
 }  # fmt: skip
 _POINT = "#9ca3af"  # of a sweep
-#: modulus as which smaller ones are drawn
+#: smaller moduli are drawn at this value
 _SMALLEST = 1e-3
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return charts, branches and special points of every scene and parameter, which may have several files."""
+    """Return charts, branches and special points for every scene and parameter; several files may belong to one."""
     groups: dict[str, dict[str, Branches]] = {}
     for file, result in results.items():
         record = result.record
@@ -105,7 +105,7 @@ def _row(branches: Branches, number: int) -> dict[str, Any]:
 
 
 def _ranges(branches: Branches) -> dict[str, list[str]]:
-    """Return the sentence and the range on every branch of each quantity that is one number, for people."""
+    """Return the description and the range on every branch of each scalar quantity, as text."""
     ranges = {}
     for name, entry in branches.scalars.items():
         ends = [(np.fmin.reduce(values), np.fmax.reduce(values)) for branch in branches.branches
@@ -117,7 +117,7 @@ def _ranges(branches: Branches) -> dict[str, list[str]]:
 
 
 def _histories(branches: Branches) -> tuple[dict[str, OrbitHistory], str]:
-    """Return the motion along chosen orbits by their names, or why there is none: a reduced model may be elsewhere."""
+    """Return the motion along chosen orbits by their names, or the reason for none, such as a missing reduced model."""
     chosen = list(itertools.islice(_chosen(branches), _MOST_ORBITS))
     try:
         along = map_along(branches.scene)
@@ -186,7 +186,7 @@ def _shown(branches: Branches) -> dict[str, str]:
 
 
 def _below(branches: Branches, branch: Branch) -> dict[str, np.ndarray]:
-    """Return the values of those quantities of a branch, for people."""
+    """Return the values of these quantities on a branch, in displayed units."""
     return {
         name: for_people(branches.scalars[name].unit)[0] * branch.quantities[name]
         for name in _shown(branches) if name in branch.quantities
@@ -194,7 +194,7 @@ def _below(branches: Branches, branch: Branch) -> dict[str, np.ndarray]:
 
 
 def _add_menu(figure: go.Figure, branches: Branches) -> None:
-    """Let the lower chart show one of its quantities."""
+    """Add a menu for the quantity in the lower chart."""
     shown, traces = _shown(branches), [index for index, trace in enumerate(figure.data) if trace.meta]
     figure.update_yaxes(title_text=next(iter(shown.values()), ""), row=2, col=1)
     buttons = [
@@ -212,7 +212,7 @@ def _add_menu(figure: go.Figure, branches: Branches) -> None:
 
 
 def joined(records: Sequence[Branches]) -> Branches:
-    """Return the branches of several files of one scene and parameter as one record, numbered through."""
+    """Return the branches of several files of one scene and parameter as one record, numbered consecutively."""
     branches: list[Branch] = []
     for record in records:
         first = len(branches)
@@ -239,7 +239,7 @@ def branch_name(number: int, branch: Branch) -> str:
 
 
 def _drawn(mask: np.ndarray) -> np.ndarray:
-    """Return own points and those just after them: lines of one kind continue to the first point of the other."""
+    """Return the masked points and those just after them: a line continues to the first point of the next one."""
     return mask | np.concatenate([[False], mask[:-1]])
 
 
@@ -270,7 +270,7 @@ def _add_special_points(figure: go.Figure, branches: Branches, wide: float) -> N
 
 
 def _branches_table(branches: Branches) -> Table:
-    """Return a row per point, branches counted from 0, in SI units."""
+    """Return one row per point, branches counted from 0, in SI units."""
     names = list(branches.scalars)
     rows = []
     for number, branch in enumerate(branches.branches):
@@ -287,7 +287,7 @@ def _branches_table(branches: Branches) -> Table:
 def _multipliers_figure(branches: Branches) -> go.Figure:
     """Draw the multipliers in the complex plane with the unit circle, and their moduli over the parameter.
 
-    Beyond the unit circle, the distance from it is the decimal logarithm of the modulus, so that all are seen.
+    Outside the unit circle, the distance from it is the decimal logarithm of the modulus, so that all are visible.
     """
     figure = make_subplots(rows=1, cols=2, column_widths=[0.46, 0.54], horizontal_spacing=0.14)
     wide, units = for_people(unit_of(branches.parameter))
@@ -337,12 +337,12 @@ def _multipliers_figure(branches: Branches) -> go.Figure:
 
 
 def _beyond(values: np.ndarray) -> float:
-    """Return the decades by which the largest multiplier lies beyond the unit circle."""
+    """Return the decades by which the largest multiplier lies outside the unit circle."""
     return float(np.log10(np.abs(values[np.isfinite(values)]).max(initial=1.0)))
 
 
 def _multipliers_table(branches: Branches) -> Table:
-    """Return a row per multiplier."""
+    """Return one row per multiplier."""
     return ["branch", branches.parameter, "real", "imaginary"], [
         [number, parameter, value.real, value.imag]
         for number, branch in enumerate(branches.branches)

@@ -21,9 +21,9 @@ from vanedamp.studies.report.sweep_beside import sweeps_beside
 
 ORDER = 70
 _STATIONARY = "#0f172a"
-#: points of a curve that are drawn; of more periods, the largest of equally many each
+#: largest number of points per curve; longer runs are drawn by the maxima of equal groups of periods
 _MOST_POINTS = 2000
-#: rates of Lewis' curve, and how far it extends beyond the runs'
+#: number of rates of Lewis' curve, and factor by which it extends beyond the rates of the runs
 _RATES, _BEYOND = 61, 3.0
 _TITLES = {"frequency": "excitation frequency, Hz", "speed": "speed of rotation, rad/s"}
 
@@ -53,7 +53,7 @@ def shown(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
 
 
 def _stress_chart(file: str, ramp: Ramp, page: Page) -> Chart | None:
-    """Return the stress of the runs over the frequency, or the speed; None without hot spots."""
+    """Return the stress of the runs versus frequency or speed; None without hot spots."""
     at = along(ramp)
     courses = {
         run_name(ramp, run): (getattr(run, at), run.stress) for run in ramp.runs
@@ -63,7 +63,7 @@ def _stress_chart(file: str, ramp: Ramp, page: Page) -> Chart | None:
 
 
 def along(ramp: Ramp) -> str:
-    """Return the series that runs are drawn over: "frequency", or "speed" where the frequency stays."""
+    """Return the horizontal axis of the charts: "frequency", or "speed" if the frequency is constant."""
     return "frequency" if any(np.ptp(run.frequency) > 0.0 for run in ramp.runs if len(run.time)) else "speed"
 
 
@@ -108,7 +108,7 @@ def figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = Map
 
 
 def menu(ramp: Ramp) -> go.Figure | None:
-    """Draw one quantity of the periods at a time, which a menu chooses; None for files of earlier versions."""
+    """Draw one quantity of the periods, chosen by a menu; None for files of earlier versions."""
     shown = [quantity for name in ramp.quantities if not (quantity := table()[name]).dims]
     if not shown or not any(len(run.time) for run in ramp.runs):
         return None
@@ -170,7 +170,7 @@ def _ramp_table(ramp: Ramp) -> Table:
 
 
 def peaks_figure(ramp: Ramp) -> go.Figure:
-    """Draw the peak over the rate, relative to the steady-state one without bodies, and Lewis' closed form."""
+    """Draw the peak versus rate, relative to the steady-state peak without bodies, and Lewis' closed form."""
     figure = go.Figure()
     lewis = np.array([ramp.lewis_rate(run) for run in ramp.runs])
     rates = np.array([abs(run.rate) for run in ramp.runs])
@@ -194,7 +194,7 @@ def peaks_figure(ramp: Ramp) -> go.Figure:
 
 
 def _peaks_table(ramp: Ramp) -> Table:
-    """Return the peaks, a row per run."""
+    """Return the peaks, one row per run."""
     return ["rate", "peak", "peak_frequency", "peak_share", "lewis_rate"], [
         [run.rate, run.peak, run.at_peak("frequency"), ramp.share(run), ramp.lewis_rate(run)] for run in ramp.runs
     ]

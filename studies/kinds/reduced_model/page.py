@@ -1,4 +1,4 @@
-"""Reduced models: frequencies, the mass that an impact feels, and hot spots on the mesh."""
+"""Reduced models: frequencies, effective mass at impact, and hot spots on the mesh."""
 
 from __future__ import annotations
 

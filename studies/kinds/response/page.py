@@ -1,4 +1,4 @@
-"""Runs: results and energies, the time history and the motion in the plane where the run kept samples, impacts."""
+"""Runs: results and energies, impacts, and from samples the time history and the motion in the plane."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def load(path: Path) -> Result:
 
 
 def figure(record: TimeHistory | Response) -> go.Figure:
-    """Draw the time history. Raises InputError for a run that kept no samples."""
+    """Draw the time history. Raises InputError for a run without samples."""
     history = record if isinstance(record, TimeHistory) else TimeHistory.of(record)
     if not len(history.time):
         raise InputError("plot: the run kept no samples; simulate(scene, events=True, samples_per_period=200)")
@@ -110,5 +110,5 @@ def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure
 
 
 def impacts_rows(impacts: Sequence[ImpactsAtPlace]) -> Iterator[tuple[object, ...]]:
-    """Yield a line a contact, bodies counted from 1, sums over the evaluated periods in SI units."""
+    """Yield one line per contact, bodies counted from 1, sums over the evaluated periods in SI units."""
     yield from ((site.body + 1, *astuple(site)[1:]) for site in impacts)

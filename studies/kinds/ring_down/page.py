@@ -52,7 +52,7 @@ def shown(file: str, record: RingDown, page: Page) -> dict[str, Any]:
 
 
 def ring_down_rows(record: RingDown) -> Iterator[list[object]]:
-    """Yield a line per half cycle, with the window of cycles that begins with it."""
+    """Yield one line per half cycle, with the window of cycles that begins with it."""
     half, whole = record.half_cycles, record.cycles
     first = zip(
         half.time.tolist(), half.amplitude.tolist(), half.frequency.tolist(), record.impacts.tolist(), strict=True
@@ -63,7 +63,7 @@ def ring_down_rows(record: RingDown) -> Iterator[list[object]]:
 
 
 def figure(record: RingDown) -> go.Figure:
-    """Draw the turning points over the time, and frequency and damping over the amplitude."""
+    """Draw the turning points versus time, and frequency and damping versus amplitude."""
     figure = make_subplots(
         rows=2, cols=2, specs=[[{"colspan": 2}, None], [{}, {}]], row_heights=[0.4, 0.6], vertical_spacing=0.14,
         horizontal_spacing=0.12,

@@ -19,9 +19,9 @@ _MOST_LABELS = 40
 
 
 def interference_figure(found: Interference) -> go.Figure:
-    """Draw frequency over nodal diameter by family, the folded lines of engine orders, and where these meet modes.
+    """Draw frequency versus nodal diameter by family, folded lines of engine orders, and their meetings with modes.
 
-    The lines are those of the ends of the range of operation. `customdata` of a mode is its number, from 0.
+    The lines are drawn for the ends of the operating range. `customdata` of a mode is its number, from 0.
     """
     figure, modes = go.Figure(), found.modes
     for speed, dash in zip(found.folded_speeds, ("solid", "dot"), strict=False):
@@ -76,7 +76,7 @@ def _add_meetings(figure: go.Figure, found: Interference, meetings: Sequence[Cro
 
 
 def ring_campbell_figure(found: Interference) -> go.Figure:
-    """Draw the modes over the speed, a colour per nodal diameter, lines of engine orders, and their meetings."""
+    """Draw the modes versus speed, one colour per nodal diameter, lines of engine orders, and their meetings."""
     figure = go.Figure()
     top, rpm = 1.06 * float(np.nanmax(found.over_speed_hz)), found.speeds * RPM
     for order in found.orders:
@@ -112,6 +112,6 @@ def interference_table(found: Interference) -> Table:
 
 
 def ring_campbell_table(found: Interference) -> Table:
-    """Return the frequencies of the modes, a row per speed."""
+    """Return the frequencies of the modes, one row per speed."""
     header = ["speed, rad/s", "speed, rpm", *(f"{found.name(mode)}, Hz" for mode in range(len(found.diameters)))]
     return header, np.column_stack([found.speeds, found.speeds * RPM, found.over_speed_hz.T]).tolist()

@@ -45,7 +45,7 @@ def shown(file: str, record: tuple[Interference, WholeRing | None], page: Page) 
     if ring.speeds.size:
         campbell = page.chart("ring-campbell", ring_campbell_figure(ring), *ring_campbell_table(ring), [file])
     if surface is not None:
-        # begins with a wave that travels
+        # begin with a travelling wave
         mode = int(np.flatnonzero(ring.diameters == np.unique(ring.diameters)[:2][-1])[0])
         view = page.chart(
             "ring", ring_view(ring.modes, surface, mode), *sector_table(ring.modes, surface, mode), [file]

@@ -15,7 +15,7 @@ _ORDER, _MARK = "#64748b", "#111827"
 
 
 def interference_picture(found: Interference, path: Path) -> None:
-    """Write frequency over nodal diameter by family, folded lines of engine orders, and their meetings, as PNG."""
+    """Write frequency versus nodal diameter by family, folded lines of engine orders, and their meetings, as PNG."""
     figure, axes = subplots(size=(9.5, 6.0))
     modes = found.modes
     for speed, style in zip(found.folded_speeds, ("-", ":"), strict=False):

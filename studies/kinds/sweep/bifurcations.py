@@ -1,4 +1,4 @@
-"""Bifurcation diagram of a sweep that keeps Poincare sections: the states at the starts of periods over an axis."""
+"""Bifurcation diagram of a sweep with Poincare sections: the states at the starts of periods versus an axis."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.studies.report.charts import axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people, setting
 
-#: panels that are drawn; points of all of them, of more the last sections of each run
+#: largest number of panels; largest number of points, above which only the last sections of each run are drawn
 MOST_PANELS, _MOST_POINTS = 12, 30_000
-#: heights of sections, of the exponent below them, and of the space between two, px
+#: heights of sections, of the exponents below them, and of the space between panels, px
 _TALL, _LOW, _BETWEEN = 330, 150, 70
 #: colours of motions, by their words
 _COLOURS = {
@@ -39,7 +39,7 @@ class Panel(NamedTuple):
 
 
 def diagram_axis(sweep: Sweep) -> str | None:
-    """Return the axis of a sweep's bifurcation diagram, the frequency or else its longest of numbers; None without."""
+    """Return the axis of a sweep's bifurcation diagram: the frequency, or the longest numeric axis; None without."""
     numeric = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and not is_start(path)]
     numeric.sort(key=lambda path: (path != FREQUENCY, -len(sweep.axes[path])))
     long = [path for path in numeric if len(sweep.axes[path]) > 1]
@@ -70,7 +70,7 @@ def diagram_panels(sweep: Sweep) -> list[Panel]:
 
 
 def _words(sweep: Sweep, point: tuple[np.ndarray | int, ...]) -> np.ndarray:
-    """Return the motions at some points: by their exponents, or else by their classification."""
+    """Return the names of motions at some points: from their exponents, or else from their classification."""
     if sweep.exponents:
         return np.asarray(sweep.exponents["motion"][point])
     kinds = (str(kind).partition("-")[0] for kind in sweep.classification[point])
@@ -79,7 +79,7 @@ def _words(sweep: Sweep, point: tuple[np.ndarray | int, ...]) -> np.ndarray:
 
 
 def bifurcation_figure(sweep: Sweep) -> go.Figure:
-    """Draw the sections over the axis, coloured by motion, and exponents below them; a menu of quantities."""
+    """Draw the sections versus the axis, coloured by motion, with exponents below them and a menu of quantities."""
     axis, panels = diagram_axis(sweep), diagram_panels(sweep)[:MOST_PANELS]
     assert axis is not None
     factor, unit = for_people(sweep.units()[axis])
@@ -124,7 +124,7 @@ def _add_exponents(figure: go.Figure, panel: Panel, factor: float, row: int) -> 
 
 
 def _clouds(panel: Panel, most: int) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
-    """Yield quantity, motion, and points (k,) of it, of a panel with more than `most` the last sections."""
+    """Yield quantity, motion, and its points (k,); only the last sections of a panel with more than `most` points."""
     for quantity, values in panel.sections.items():
         values = values[:, -max(1, most // len(values)) :]
         for word in dict.fromkeys(panel.motion):
@@ -154,7 +154,7 @@ def bifurcation_header(sweep: Sweep) -> tuple[str, ...]:
 
 
 def bifurcation_rows(sweep: Sweep) -> Iterator[list[object]]:
-    """Yield a line per section of every point of the panels drawn, in SI units."""
+    """Yield one line per section of every point of the drawn panels, in SI units."""
     for panel in diagram_panels(sweep)[:MOST_PANELS]:
         has_exponent = panel.exponent is not None and panel.confidence is not None
         stacked = np.stack(list(panel.sections.values()), axis=-1)
