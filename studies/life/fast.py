@@ -1,4 +1,4 @@
-"""The fast motion of a life: wear rates and amplitudes over the band, by runs that a checkpoint keeps."""
+"""The fast motion of a life: wear rates and amplitudes in the band, from runs stored in a checkpoint."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from vanedamp.files.toml_input import InputError, tables
 from vanedamp.studies.life.study import HALVINGS, LifeStudy, WearContact
 from vanedamp.studies.measure import Measure
 
-#: statuses of runs that came to their end, whose figures count; those but the first are reported
+#: statuses of complete runs, whose results count; all but the first are reported
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN, Status.TILTED)
 #: columns of a run before the rates of its contacts and their confidence
 _AMPLITUDE, _CONFIDENCE, _OK, _RATES = range(4)
 
 
 class BandMeans(NamedTuple):
-    """Means over the band at a state.
+    """Means over the band at a state of wear.
 
     rate, confidence: (c,) volumes of wear per hour, m^3/h, and half widths of their 95 % confidence intervals.
-    amplitude, spread: (f,) what counts over the reference and half widths; nan where a run failed.
-    reduction, reduction_confidence: of what counts of the band.
+    amplitude, spread: (f,) measure relative to the reference, and half widths; nan where a run failed.
+    reduction, reduction_confidence: of the band, and half width.
     """
 
     rate: np.ndarray
@@ -44,9 +44,9 @@ class BandMeans(NamedTuple):
 
 
 def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[WearContact]]:
-    """Return the row of a run and its contacts; nan, and none, where it failed: the task of a worker.
+    """Return the row of a run and its contacts, in a worker; nan and no contacts where it failed.
 
-    The confidence of what counts is taken to be that of the mean amplitude, relative to it.
+    The relative confidence of the measure is taken to be that of the mean amplitude.
     """
     try:
         response = simulate(scene)
@@ -76,14 +76,14 @@ def _or(value: float | None, default: float) -> float:
 class LifeRuns(SceneCheckpoint):
     """Runs of a life so far, in memory and in a file (path None: in memory only).
 
-    The same life asks for the same runs in the same order, and begins with those kept.
+    The same life requests the same runs in the same order, so that stored runs come first.
     """
 
     def __init__(
         self, path: str | Path | None, study: LifeStudy, executor: Executor | None, provenance: Mapping[str, Any],
         progress: Callable[[int], None],
     ) -> None:  # fmt: skip
-        """Take up the file's runs. progress: called with the number of runs done.
+        """Load the file's runs. progress: called with the number of runs done.
 
         Raises InputError for a file of another study, or one that cannot be read.
         """
@@ -98,7 +98,7 @@ class LifeRuns(SceneCheckpoint):
             self.contacts = [WearContact(*values) for values in json.loads(content[1]["contacts"])]
 
     def at(self, scene: Scene) -> BandMeans:
-        """Run a scene over the band, unless the runs are kept, and return its means. Raises SweepError."""
+        """Run a scene over the band, unless its runs are stored, and return the means. Raises SweepError."""
         rows, beyond = self._at(scene, self.study.frequencies.tolist()), 0.0
         band = len(rows)
         if self.study.refines:
@@ -122,10 +122,10 @@ class LifeRuns(SceneCheckpoint):
         return self._rows[self.asked - len(points) : self.asked]
 
     def _refined(self, scene: Scene, band: Sequence[np.ndarray]) -> tuple[list[np.ndarray], float]:
-        """Return rows about the worst point of the band, at ever smaller spacing, and how much worse it may be, m.
+        """Return rows around the worst point of the band, at ever smaller spacing, and the estimated remaining rise, m.
 
-        That is by what the last halving has made it worse, or half of what the one before has: each comes nearer to
-        the worst by a quarter of the rest in a smooth curve, and by half in one that ends in a jump.
+        The estimate is the rise in the last halving, or half of that in the one before: halving reduces the distance
+        to the maximum to a quarter in a smooth curve, and to half in one that ends in a jump.
         """
         frequencies, heights = self.study.frequencies.tolist(), [_height(row) for row in band]
         more, rise = list[np.ndarray](), 0.0
@@ -142,7 +142,7 @@ class LifeRuns(SceneCheckpoint):
         return more, rise
 
     def content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
-        """Return variables of the file, its contacts, and how much is finished, in words."""
+        """Return the variables of the file, its contacts, and the progress in words."""
         width = max(map(len, self._rows), default=0)
         rows = np.array([np.r_[row, np.full(width - len(row), np.nan)] for row in self._rows])
         contacts = json.dumps([list(contact) for contact in self.contacts])
@@ -155,14 +155,14 @@ class LifeRuns(SceneCheckpoint):
         return _handed_out(self._executor, points, measures)
 
     def _means(self, rows: np.ndarray, band: int, beyond: float) -> BandMeans:
-        """Return the means of points (k, columns), those of the band first.
+        """Return the means of rows (k, columns), those of the band first.
 
-        beyond: m, by which the worst may be worse.
+        beyond: estimate by which the maximum may be higher, m.
         """
         table, c = self.study.table, len(self.contacts)
         ok = np.isfinite(rows[:, _AMPLITUDE])
         amplitude, spread = rows[:, _AMPLITUDE] / self.study.reference, rows[:, _CONFIDENCE] / self.study.reference
-        # runs that failed say nothing of their frequencies; where all have, nothing is damped
+        # failed runs are left out; if all have failed, there is no damping
         counted = np.where(ok, amplitude, -np.inf) if ok.any() else np.ones(len(rows))
         highest = int(np.argmax(counted))
         weights = np.arange(len(rows)) < band

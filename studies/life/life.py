@@ -1,4 +1,4 @@
-"""How long a damper damps: wear opens its cavities, and the response is computed anew until the reduction is lost."""
+"""Service life of a damper: wear opens its cavities, and the response is recomputed until the reduction is lost."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from vanedamp.studies.life.slow import STAGES, Moment, Steps, between, integrate
 from vanedamp.studies.life.study import LifeStudy, WearEffect
 from vanedamp.studies.worst_start import worst_start
 
-#: width of the interval in which the threshold is passed, over the hours, below which it is not halved any more
+#: relative width of the interval with the crossing of the threshold at which halving stops
 _CLOSE = 0.01
-#: fraction of a body's mass below which it is worn away
+#: below this fraction of its mass a body counts as worn away
 _LEFT = 0.05
 
 
@@ -34,10 +34,10 @@ def life(
 ) -> LifeRecord:
     """Integrate the wear of a damper over the hours of its study, or until the reduction is lost with certainty.
 
-    progress: called with the number of runs done and of those expected; checkpoint: a file to which finished runs are
-    written and from which an interrupted life resumes; the caller removes it once the result is safe
+    progress: called with the numbers of finished and expected runs; checkpoint: a file to which finished runs are
+    written and from which an interrupted life resumes; the caller removes it after the result is saved
     (files.checkpoint_file.clear).
-    Raises InputError for a contact that opens a gap and whose patch is not known, SweepError where workers are lost.
+    Raises InputError for a contact that opens a gap and has no known patch, SweepError if workers are lost.
     """
     expected = _Expected(study, progress)
     with LifeRuns(checkpoint, study, executor, provenance or {}, expected) as runs:
@@ -56,7 +56,7 @@ def life(
 
 
 class _Expected:
-    """Progress in runs. total: of those expected so far."""
+    """Progress in runs. total: runs expected so far."""
 
     def __init__(self, study: LifeStudy, progress: Callable[[int, int], None] | None) -> None:
         self._study, self._progress, self.total = study, progress, study.runs
@@ -67,13 +67,13 @@ class _Expected:
             self._progress(done, max(self.total, done))
 
     def after(self, done: int) -> Callable[[int, int], None]:
-        """Return the progress of runs that follow those done."""
+        """Return the progress function of runs that follow finished ones."""
         return lambda more, _: self(done + more)
 
     def at(self, asked: int, before: Moment[BandMeans] | None, now: Moment[BandMeans], steps: Steps) -> None:
-        """Expect the runs from a moment on, with those asked for so far and the moment before.
+        """Estimate the total from the present moment, the one before and the runs requested so far.
 
-        The reduction goes on as since then; once it is lost, the time at which that was is halved a few times.
+        The reduction is extrapolated linearly; when it is lost, the interval of the crossing is halved a few times.
         """
         table, halved = self._study.table, 0
         end, step = table.hours, 0.0 if table.steps is None else table.hours / table.steps
@@ -89,11 +89,11 @@ class _Expected:
 
 
 class WornAway(Exception):
-    """A body is worn away within a step, as steps of a fixed number may."""
+    """A body is worn away within a step, which can happen with a fixed number of steps."""
 
 
 class _Course:
-    """Rates by volumes of wear, and the scales of these."""
+    """Rates as a function of volumes of wear, and scales of the volumes."""
 
     def __init__(self, study: LifeStudy, wearing: WearEffect, runs: LifeRuns, first: BandMeans) -> None:
         self.study, self.wearing, self._runs = study, wearing, runs
@@ -101,22 +101,22 @@ class _Course:
 
     @property
     def asked(self) -> int:
-        """Runs asked for so far."""
+        """Runs requested so far."""
         return self._runs.asked
 
     def rates(self, volume: np.ndarray) -> BandMeans:
-        """Return what is found with some wear."""
+        """Return the means at given volumes of wear."""
         if np.any(self.wearing.lost(volume) >= 1.0):
             raise WornAway
-        if self._new is not None:  # the first runs have told the contacts
+        if self._new is not None:  # of the first runs, which determined the contacts
             means, self._new = self._new, None
             return means
         return self._runs.at(self.wearing.worn(volume))
 
     def scale(self, volume: np.ndarray) -> np.ndarray:
-        """Return the volumes (c,), m^3, by which contacts together change gap, play or a body's mass by all of it.
+        """Return the volumes (c,), m^3, for which contacts together double a gap or play, or remove a body.
 
-        inf for those that do not.
+        inf for contacts that change none of them.
         """
         scale, wearing = np.full(len(volume), np.inf), self.wearing
         lost = wearing.lost(volume)
@@ -135,7 +135,7 @@ class _Course:
 
 
 def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[BandMeans]]:
-    """Yield the moments, those between two steps as well where the threshold is passed."""
+    """Yield the moments, with additional ones between two steps where the threshold is crossed."""
     table, threshold, before, damped = course.study.table, course.study.threshold, None, False
     steps = Steps(table.tolerance, table.reach, course.scale, table.steps)
     start = np.zeros(course.wearing.gap.shape[1])
@@ -154,7 +154,7 @@ def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[BandMeans]
 
 
 def _worn_away(wearing: WearEffect, last: Moment[BandMeans]) -> tuple[float, int] | None:
-    """Return when a body is worn away at the rates of the last moment, h, and its number; None: never, or not known."""
+    """Return when a body is worn away at the latest rates, h, and its number; None: never, or size unknown."""
     rate, remaining = wearing.losses @ last.found.rate, 1.0 - wearing.lost(last.state)
     spans = np.divide(remaining, rate, out=np.full(len(remaining), np.inf), where=np.isfinite(remaining) & (rate > 0.0))
     first = int(np.argmin(spans))
@@ -166,9 +166,9 @@ def _passes(before: Moment[BandMeans], after: Moment[BandMeans], threshold: floa
 
 
 def _halved(course: _Course, before: Moment[BandMeans], after: Moment[BandMeans]) -> Iterator[Moment[BandMeans]]:
-    """Yield moments between two, until the time at which the reduction passes the threshold is known well enough.
+    """Yield moments between two, until the time of crossing the threshold is accurate enough.
 
-    It is, too, where reductions differ by less than their confidence.
+    Halving also stops if reductions differ by less than their confidence.
     """
     table, first, last, moments = course.study.table, before, after, list[Moment[BandMeans]]()
     while last.time - first.time > _CLOSE * table.hours:
@@ -187,7 +187,7 @@ def _record(
     study: LifeStudy, wearing: WearEffect, runs: LifeRuns, moments: list[Moment[BandMeans]], starts: dict[str, Any],
     provenance: dict[str, Any],
 ) -> LifeRecord:  # fmt: skip
-    """Return the record of moments in the order of their times."""
+    """Return the record of moments in ascending time."""
     volume = np.array([moment.state for moment in moments])
     band, error = (np.array([getattr(moment, name) for moment in moments]) for name in ("band", "error"))
     rate, confidence = (np.array([getattr(m.found, name) for m in moments]) for name in ("rate", "confidence"))
@@ -226,9 +226,9 @@ def _record(
 def _hours(
     time: np.ndarray, reduction: np.ndarray, band: np.ndarray, late: np.ndarray, threshold: float
 ) -> tuple[float | None, float | None, float | None]:
-    """Return when the reduction is lost: of its curve, at the earliest and at the latest; None: not within the time.
+    """Return the time when the reduction is lost: nominal, earliest and latest; None: not within the hours.
 
-    0 where it is never kept. late (n,): h by which the depths of wear may be early or late.
+    0 if it is never reached. late (n,): uncertainty of the depths of wear as a time, h.
     """
     lost, early, last = (_lost(time, reduction - threshold + side * band) for side in (0.0, -1.0, 1.0))
     if early is not None:
@@ -237,7 +237,7 @@ def _hours(
 
 
 def _lost(time: np.ndarray, above: np.ndarray) -> float | None:
-    """Return the first time at which a curve that has been above zero falls below it."""
+    """Return the first time at which a curve falls below zero after being above it."""
     reached = np.flatnonzero(above >= 0.0)
     if len(reached) == 0:
         return 0.0

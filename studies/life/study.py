@@ -1,4 +1,4 @@
-"""The study of a life: a scene with [wear], and a [life] table of hours, frequencies and the reduction to keep."""
+"""The study of a life: a scene with [wear], and a [life] table with hours, frequencies and the required reduction."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from vanedamp.studies.band import Band, drive, file_in, placed, reference_amplit
 from vanedamp.studies.measure import AMPLITUDES, Measure
 from vanedamp.studies.worst_start import STARTS
 
-#: about how often a life is evaluated over its band
+#: approximate number of evaluations of the band
 _EVALUATIONS = 20
-#: how often the spacing of a band is halved about its worst point
+#: number of times that the spacing of a band is halved around its worst point
 HALVINGS = 3
 _Ratio = Annotated[Real, Field(gt=0, lt=1)]
 
@@ -115,7 +115,7 @@ class LifeStudy(NamedTuple):
 
     @classmethod
     def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> LifeStudy:
-        """Return the study in the tables of a TOML file that lies at `path`, which errors name. Raises InputError."""
+        """Return the study in the tables of a TOML file; errors name its `path`. Raises InputError."""
         file = file_in(LifeFile, tables, "life", "give hours and a band in a [life] table (docs/wear.md)", path)
         try:
             scene, band = placed(scene_in(file), file.life)
@@ -142,7 +142,7 @@ class LifeStudy(NamedTuple):
 
     @property
     def refines(self) -> bool:
-        """Whether the worst point is sought between those of the band, too: not where these are listed."""
+        """Whether the worst point is also sought between the points of the band: not if these are a list."""
         spaced = isinstance(getattr(self.table, self.table.key), Range) and len(self.frequencies) > 1
         return spaced and (self.table.over_band == "worst" or self.table.dwell == "peak")
 
@@ -153,13 +153,13 @@ class LifeStudy(NamedTuple):
 
     @property
     def runs(self) -> int:
-        """About how many runs a life takes."""
+        """Approximate number of runs of a life."""
         return _EVALUATIONS * self.each + self.starts
 
     def wearing(self, contacts: Sequence[WearContact]) -> WearEffect:
-        """Return how the scene wears at its contacts.
+        """Return the effect of wear at contacts on the scene.
 
-        Raises InputError for a contact that opens a gap and whose patch is not known.
+        Raises InputError for a contact that opens a gap and has no known patch.
         """
         scene = self.scene
         gap, play = opening(scene, [(contact.damper, contact.side) for contact in contacts])
@@ -181,9 +181,9 @@ class LifeStudy(NamedTuple):
 
 
 class WearEffect(NamedTuple):
-    """How volumes of wear (c,), m^3, change a scene: gaps and plays by matrices (cavities, c), 1/m^2.
+    """Effect of volumes of wear (c,), m^3, on a scene: gaps and plays grow by matrices (cavities, c), 1/m^2.
 
-    shares: (bodies, c) of the volumes that the bodies lose.
+    shares: (bodies, c) fraction of each volume that a body loses.
     """
 
     scene: Scene
@@ -201,12 +201,12 @@ class WearEffect(NamedTuple):
 
     @property
     def losses(self) -> np.ndarray:
-        """Fractions (bodies, c) of each body per volume of wear, 1/m^3; nan where its size is not known."""
+        """Fractions (bodies, c) of each body lost per volume of wear, 1/m^3; nan if its size is unknown."""
         fractions: np.ndarray = self.shares / body_volumes(self.scene)[:, None]
         return fractions
 
     def lost(self, volume: np.ndarray) -> np.ndarray:
-        """Return the fraction of each body that is worn away; nan where its size is not known."""
+        """Return the worn fraction of each body; nan if its size is unknown."""
         fractions: np.ndarray = self.losses @ volume
         return fractions
 
