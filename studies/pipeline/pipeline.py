@@ -1,4 +1,4 @@
-"""Pipelines: the stages from a case to a report, of which only those run whose inputs have changed."""
+"""Pipelines: stages from a case to a report; only stages with changed inputs run."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from vanedamp.studies.pipeline.tables import PipelineFile
 
 @dataclass(frozen=True)
 class StageResult:
-    """What became of a stage.
+    """The outcome of a stage.
 
     status   "kept": nothing has changed, "done"; of a dry run "runs", or "perhaps": if its inputs change
-    reasons  why it is not kept
+    reasons  for running it
     found    its result, in one line
     outputs  its files
     """
@@ -41,7 +41,7 @@ class StageResult:
 
 @dataclass(frozen=True, repr=False)
 class PipelineResult(Displayed):
-    """What became of the stages of a pipeline, in their order."""
+    """The outcome of the stages of a pipeline, in their order."""
 
     stages: tuple[StageResult, ...]
     wall_time_s: float
@@ -98,7 +98,7 @@ def pipeline(
 
 
 def adopt(path: str | Path) -> None:
-    """Note that results in the folder of a pipeline file match its inputs as they are: made by other means."""
+    """Record that results in the folder of a pipeline file match its present inputs, if made by other means."""
     table, source = PipelineFile.load(path), Path(path)
     folder = source.parent / table.folder
     record = PipelineRecord(folder / f"{source.stem}.record.json")
@@ -147,7 +147,7 @@ def _plan(listed: Sequence[Stage], record: PipelineRecord, say: Callable[[str], 
 
 
 def _check(listed: Sequence[Stage], files: Iterable[str | Path], source: Path, workers: int) -> None:
-    """Reject bad input before anything runs, and results that would take the place of an input."""
+    """Reject bad input before anything runs, and results that would overwrite an input."""
     inputs = {(source.parent / file).resolve() if file != source else source.resolve() for file in files}
     owners: dict[Path, str] = {}
     for stage in listed:
@@ -166,7 +166,7 @@ def _check(listed: Sequence[Stage], files: Iterable[str | Path], source: Path, w
 
 
 def _keep_edited(listed: Sequence[Stage], record: PipelineRecord) -> None:
-    """Reject overwriting a case or a scene that somebody has edited; other results are made again."""
+    """Reject overwriting a case or scene that was edited by hand; other results are made again."""
     for stage in listed:
         for path in record.edited(stage.name, [path for path in stage.outputs if path.suffix == ".toml"]):
             raise InputError(
