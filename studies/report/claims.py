@@ -1,4 +1,4 @@
-"""The claims of a study: a file of its own next to the results that they rest on."""
+"""The claims of a study, in a file next to the results that support them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Designs of sweeps, each judged by its worst curve.
+"""Designs of sweeps, each rated by its worst curve.
 
-The designer chooses gap and mass, but neither how a run begins nor what friction turns out to be
-(coupling.sweep.designs.is_choice). So curves that differ in nothing else are one design, as good as the worst of
+The designer chooses gap and mass, but neither the start of a run nor the friction
+(coupling.sweep.designs.is_choice). Curves that differ only in these are one design, rated by the worst of
 them.
 """
 
@@ -42,7 +42,7 @@ class DesignCurves:
 
     @property
     def remarks(self) -> list[str]:
-        """Which of its curves the results are of, and that there is one start only."""
+        """Remarks on the curve that the results refer to, and on a single start."""
         remarks = []
         if len(self.curves) > 1:
             paths = dict.fromkeys(path for curve in self.curves for path in curve.settings if not is_choice(path))
@@ -55,7 +55,7 @@ class DesignCurves:
 
     @property
     def sentence(self) -> str:
-        """The result for people, of the worst curve."""
+        """The result of the worst curve in words."""
         return "; ".join([self.worst.sentence, *self.remarks])
 
     def to_json(self) -> dict[str, Any]:
@@ -65,7 +65,7 @@ class DesignCurves:
 
 
 def designs(responses: Iterable[ForcedResponse]) -> list[DesignCurves]:
-    """Return the designs of some curves, the best first: the one whose worst curve has the lowest damped peak.
+    """Return the designs of curves, best first: the best has the lowest damped peak of its worst curve.
 
     Peaks are relative to those without bodies. Designs are at the end if a point that is not ok may be their peak.
     """
@@ -77,7 +77,7 @@ def designs(responses: Iterable[ForcedResponse]) -> list[DesignCurves]:
 
 
 def best_first(responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:
-    """Return curves by their designs, the best first, and of each design the worst first."""
+    """Return curves sorted by designs, best first, and within each design worst first."""
     return [curve for design in designs(responses) for curve in design.curves]
 
 

@@ -55,7 +55,7 @@ class ForcedResponse(Measured):
     hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
     settings           values of the sweep's other axes by path
     source             the file it comes from
-    peak_known         whether no point that is not ok may be the peak
+    peak_known         whether the peak is certain: no failed point can be higher
     design, start      what stands for the numbers of its scene that the designer chooses, and for how its runs begin
     """
 
@@ -86,7 +86,7 @@ class ForcedResponse(Measured):
 
     @property
     def sentence(self) -> str:
-        """The headline for people."""
+        """The headline in words."""
         sentence = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1], math.isfinite(self.hertz))
         return f"{self.name}: {sentence}"
 
@@ -192,10 +192,10 @@ def response_along(
 
 
 def linear_curves(sweep: Sweep, response: ForcedResponse) -> LinearCurves:
-    """Return the linear curves of a response so fine that they hide no peak; at its points only where that cannot be.
+    """Return linear curves of a response, fine enough to resolve all peaks; otherwise at its points only.
 
-    They are computed from the sweep's scene, and taken if they agree with the sweep's at its points: a reduced
-    model may lie elsewhere by now, or be another one.
+    They are computed from the sweep's scene, and used if they agree with the sweep at its points: a reduced
+    model may have been moved or replaced since.
     """
     stored = response.linear
     if not math.isfinite(response.hertz) or not np.isfinite(stored.undamped).all():
@@ -213,9 +213,9 @@ def linear_curves(sweep: Sweep, response: ForcedResponse) -> LinearCurves:
 
 
 def linear_between(scene: Scene, low: float, high: float, further: np.ndarray = _NOWHERE) -> LinearCurves:
-    """Return the linear curves from a frequency to another, Hz, so fine that they hide no peak, and at further ones.
+    """Return linear curves between two frequencies, Hz, fine enough to resolve all peaks, and at further frequencies.
 
-    Along an engine order that is not sure. Raises InputError as coupling.system.linear_response.linear_responses.
+    Along an engine order, peaks may be missed. Raises InputError as coupling.system.linear_response.linear_responses.
     """
     if scene.excitation.engine_order is None:
         both = linear_responses(scene)

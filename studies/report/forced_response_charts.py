@@ -39,7 +39,7 @@ def responses_figure(
     """Draw linear and damped (maximum and mean) amplitudes, relative to the maximum without bodies.
 
     linear: the linear curves of each, by default those at its points. shown: names of the responses that are drawn at
-    first; the others wait for `curves.js`, and the table next to the chart is its legend. Default: all, with a legend.
+    first; `curves.js` adds the others, with the table next to the chart as legend. Default: all, with a legend.
     """
     figure = go.Figure()
     colours = cycle(len(responses))
@@ -95,7 +95,7 @@ def _parted(drawn: Mapping[str, Any], gaps: np.ndarray) -> dict[str, Any]:
 def _add_band(
     figure: go.Figure, shown: Collection[str] | None, response: ForcedResponse, colour: str, gaps: np.ndarray
 ) -> None:
-    """Draw the 95 % confidence of the means as a band, in a piece between two jumps each."""
+    """Draw the 95 % confidence of the means as a band, in pieces between jumps."""
     sure = _known(np.isfinite(response.confidence) & np.isfinite(response.damped_mean))
     for points in (segment for piece in sure for segment in np.split(piece, np.searchsorted(piece, gaps))):
         if not (response.confidence[points] > 0.0).any():
@@ -166,7 +166,7 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
     """Draw where the energy goes: stacked fractions of the losses, one panel per response, each with a point."""
     columns = min(len(responses), _PANELS)
     rows = -(-len(responses) // columns)
-    # a name is as wide as a panel at most: its settings stand below each other
+    # names are wrapped to the width of a panel
     titles = ["<br>".join(_wrapped(response.name, _TITLE_WIDTH // columns)) for response in responses]
     lines = max(title.count("<br>") for title in titles) + 1
     above, below = 20 + 16 * lines, 60
@@ -198,7 +198,7 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
 
 
 def _known(mask: np.ndarray) -> list[np.ndarray]:
-    """Return the places of the points (n,) that are known, in pieces without others between them."""
+    """Return the indices of the known points (n,) in contiguous pieces."""
     indices = np.flatnonzero(mask)
     return [piece for piece in np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1) if piece.size]
 

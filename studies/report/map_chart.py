@@ -22,7 +22,7 @@ from vanedamp.studies.report.forced_response import for_people, setting
 _FEWEST = 4  # values of the second axis that make a map
 #: panels that are drawn
 MOST_PANELS = 24
-#: panels in two columns, of more there are three; heights of a panel and of the space between two, px
+#: largest number of panels in two columns, otherwise three; heights of a panel and of the space between panels, px
 _IN_TWO, _TALL, _LOW, _BETWEEN = 6, 440, 320, 120
 #: colours that the colour-blind tell apart (Okabe and Ito 2008)
 _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")
@@ -31,9 +31,9 @@ _NOT_OK, _NO_STATE = "#9ca3af", "not ok"
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
-    """Return the two axes of a sweep's map: the frequency, or else the longest, and the longest other; None without.
+    """Return the two axes of a sweep's map: the frequency, or the longest axis, and the next longest; None without.
 
-    How runs begin is no axis of a map.
+    Starts of runs are no axes of a map.
     """
     numeric = [path for path in long_axes(sweep) if not is_start(path)]
     numeric.sort(key=lambda path: (path != FREQUENCY, -len(sweep.axes[path])))
@@ -41,7 +41,7 @@ def map_axes(sweep: Sweep) -> tuple[str, str] | None:
 
 
 def long_axes(sweep: Sweep) -> list[str]:
-    """Return the axes with numbers enough for a map."""
+    """Return the numeric axes with enough values for a map."""
     return [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) >= _FEWEST]
 
 
@@ -120,7 +120,7 @@ def panels(
 
 
 def basin_axes(sweep: Sweep) -> tuple[str, str] | None:
-    """Return the two starts over which a sweep shows basins, a place across and a rate up; None without two."""
+    """Return the two starts of a sweep's basins, position horizontally and velocity vertically; None without two."""
     starts = sorted(filter(is_start, long_axes(sweep)), key=lambda path: -len(sweep.axes[path]))[:2]
     starts.sort(key=lambda path: path.endswith(("velocity", "rate")))
     return (starts[0], starts[1]) if len(starts) == 2 else None
@@ -132,13 +132,13 @@ def has_responses(sweep: Sweep) -> bool:
 
 
 def count_axes(sweep: Sweep) -> tuple[str, str] | None:
-    """Return the two keys over which a sweep counts steady states; None without, or where all runs begin alike."""
+    """Return the two parameters of a sweep's map of steady states; None without, or if all runs have the same start."""
     several = any(is_start(path) and len(values) > 1 for path, values in sweep.axes.items())
     return map_axes(sweep) if several else None
 
 
 def basins_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
-    """Draw in which motion the run from each start ends, by colour; one panel per combination of other axes."""
+    """Draw the final motion of the run from each start, by colour; one panel per combination of other axes."""
     motions = _motions(states)
     shades = [_NOT_OK, *(_COLOURS[number % len(_COLOURS)] for number in range(len(motions) - 1))]
     named = basin_panels(sweep, states)
@@ -170,14 +170,14 @@ def basin_panels(sweep: Sweep, states: SteadyStates) -> list[Panel]:
 
 
 def _names(states: Sequence[SteadyState]) -> list[str]:
-    """Return the motions of states; a second one of a kind, of larger amplitude, has its number."""
+    """Return the names of states' motions; further ones of a kind, with larger amplitude, are numbered."""
     motions = [state.motion for state in states]
     earlier = [motions[:number].count(motion) for number, motion in enumerate(motions)]
     return [f"{motion} ({count + 1})" if count else motion for motion, count in zip(motions, earlier, strict=True)]
 
 
 def _motions(states: SteadyStates) -> list[str]:
-    """Return the name of runs that are not ok, then of all motions, by falling number of runs."""
+    """Return the name of failed runs, then the names of all motions by descending number of runs."""
     runs: Counter[str] = Counter()
     for at_point in states.states.flat:
         runs.update(dict(zip(_names(at_point), (state.runs for state in at_point), strict=True)))
@@ -206,6 +206,6 @@ def state_rows(sweep: Sweep, states: SteadyStates) -> Iterator[list[object]]:
 
 
 def _steps(shades: Sequence[str]) -> list[list[object]]:
-    """Return a colour scale of steps as wide as each other."""
+    """Return a colour scale of equal steps."""
     edges = np.repeat(np.linspace(0.0, 1.0, len(shades) + 1), 2)[1:-1]
     return [[edge, shade] for edge, shade in zip(edges.tolist(), np.repeat(shades, 2).tolist(), strict=True)]

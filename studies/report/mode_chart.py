@@ -1,4 +1,4 @@
-"""Mode shapes that can be turned: the surface of the mesh, deformed and coloured by displacement (plotly)."""
+"""Interactive mode shapes: the surface of the mesh, deformed and coloured by displacement (plotly)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from vanedamp.studies.report.charts import FONT
 
-#: surfaces with more triangles than this are shown as pictures: turning them would be no pleasure
+#: surfaces with more triangles are shown as pictures: rotating them would be too slow
 MOST_TRIANGLES = 60_000
 _MOST_MODES = 12
 _DISTANCE = 2.3  # of the eye, in sizes of the scene
@@ -58,7 +58,7 @@ def unit_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def screen_of(view: np.ndarray) -> np.ndarray:
-    """Return the directions (3, 2) to the right and up of a screen across a view (3,), of unit length."""
+    """Return the unit vectors (3, 2) to the right and up on a screen normal to a view direction (3,)."""
     right = np.array([-view[1], view[0], 0.0]) / np.hypot(view[0], view[1])
     return np.column_stack([right, np.cross(view, right)])
 
@@ -70,14 +70,14 @@ def deformed(points: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 class MeshSurface(NamedTuple):
-    """The nodes (n,) on a mesh's surface, and its triangles (t, 3) as places in them."""
+    """The nodes (n,) on a mesh's surface, and its triangles (t, 3) as indices of these nodes."""
 
     nodes: np.ndarray
     triangles: np.ndarray
 
 
 def small_surface(values: Mapping[str, np.ndarray], most: float = MOST_TRIANGLES) -> MeshSurface | None:
-    """Return the surface of a record of modes, if a page can carry it: so many triangles at most."""
+    """Return the surface of a record of modes; None if it has more than `most` triangles."""
     cells = values["cell"]
     if cells.shape[1] not in _FACES:
         return None
@@ -86,21 +86,21 @@ def small_surface(values: Mapping[str, np.ndarray], most: float = MOST_TRIANGLES
 
 
 def viewpoint(points: np.ndarray, shape: np.ndarray, elevations: Sequence[float] = (_ELEVATION,)) -> np.ndarray:
-    """Return the direction (3,), of unit length, from which a mode's shape (n, 3) at points (n, 3) is best seen.
+    """Return the unit vector (3,) of the best viewpoint for a mode's shape (n, 3) at points (n, 3).
 
-    Of directions around z, at elevations above the horizon in degrees, that from which most of the motion is in sight,
-    and across the view: nothing that stands still hides it.
+    Of directions around z at elevations above the horizon, in degrees, it shows most of the motion,
+    in the screen plane and not hidden by parts at rest.
     """
     above, angles = (grid.ravel() for grid in np.meshgrid(np.radians(elevations), np.radians(_AZIMUTHS), indexing="ij"))
     views = np.column_stack([np.cos(above) * np.cos(angles), np.cos(above) * np.sin(angles), np.sin(above)])
     scores = [_in_sight(points, shape, view) for view in views]
-    # of views as good as each other, the first, whatever the last bit says
+    # of equally good views the first, independent of the last bit
     best = int(np.flatnonzero(np.array(scores) >= 0.99 * max(scores))[0])
     return np.asarray(views[best])
 
 
 def _in_sight(points: np.ndarray, shape: np.ndarray, view: np.ndarray) -> float:
-    """Return how much motion across a view is to be seen: squares over the nearest points of a coarse screen."""
+    """Return the visible motion in the screen plane: sum of squares over the nearest points of a coarse screen."""
     across = screen_of(view)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     cell = np.floor(points @ across * (_SCREEN / size)).astype(int)

@@ -1,6 +1,6 @@
-"""Motion of bodies in their cavities as it is drawn: outlines, walls and contacts, frame by frame.
+"""Motion of bodies in their cavities for drawing: outlines, walls and contacts, frame by frame.
 
-Plays are micrometres where bodies are millimetres: displacements, tilts and free travels are drawn `factor` times as
+Clearances are micrometres and bodies millimetres: displacements, tilts and free travels are drawn `factor` times as
 large. A corner moves by (x - theta b, y + theta a), as in the equations of motion, so that it is drawn on a surface if
 and only if its gap is zero.
 """
@@ -120,7 +120,7 @@ class RunFrames:
 
     @property
     def has_sliders(self) -> bool:
-        """Whether there are bodies whose drawn size means nothing."""
+        """Whether there are bodies without a size, whose drawn size is arbitrary."""
         return any(not body.form.extended for cavity in self.cavities for body in cavity.bodies)
 
     @property
@@ -190,7 +190,7 @@ def motion_of(
 
 @dataclass(frozen=True, eq=False)
 class _Drawing:
-    """Common data of all cavities of a drawing."""
+    """Data for all cavities of a drawing."""
 
     scene: Scene
     plane: PlanarSamples
@@ -262,9 +262,9 @@ class _Drawing:
         return corners if len(corners) else np.array([(-a, -b), (a, -b), (a, b), (-a, b)])
 
     def _moved(self, k: int, side: str, play: float, *ends: float) -> np.ndarray:
-        """Return by how much a surface has moved towards its outside, relative to the floor: (n, 2) at two ends.
+        """Return the outward displacement of a surface relative to the floor, (n, 2) at two ends.
 
-        That is its gap less the play left by the body's pose, at the contacts, and on the line through two.
+        It is the contact's gap less the clearance from the body's pose, on the line through the contacts.
         ends: from the body's centre, across it for walls, along it for a ceiling.
         """
         along, lift, tilt = self._pose(k)
@@ -282,12 +282,12 @@ class _Drawing:
         return np.column_stack([moved[low] + slope * (end - low) for end in ends])
 
     def _ceiling(self, play: float, k: int) -> np.ndarray:
-        """Return by how much the ceiling above a body has risen relative to the floor, (n, 2) at the body's ends."""
+        """Return the rise of the ceiling above a body relative to the floor, (n, 2) at the body's ends."""
         a = self.half[k][0]
         return self._moved(k, "ceiling", play, -a, a)
 
     def _wall(self, cavity: Cavity, inside: list[int], side: str, height: float) -> np.ndarray:
-        """Return by how much a wall has moved along relative to the floor, (n, 2) at the floor and at a height."""
+        """Return the displacement of a wall along the floor relative to it, (n, 2) at the floor and at a height."""
         k = inside[0 if side == "left" else -1]
         sign = -1.0 if side == "left" else 1.0
         b = self.half[k][1]
@@ -316,7 +316,7 @@ def _turned(turn: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def _forms(scene: Scene, plane: PlanarSamples) -> list[Shape]:
-    """Return as what each body ran: one without tilt as a slider, an open shape that tilts as a block."""
+    """Return the shape as which each body ran: without tilt a slider, with tilt and an open shape a block."""
     return [
         Slider() if np.isnan(tilt).any() else damper.form if damper.form.extended else Block()
         for damper, tilt in zip(scene.damper, plane.body_tilt.T, strict=True)
@@ -324,7 +324,7 @@ def _forms(scene: Scene, plane: PlanarSamples) -> list[Shape]:
 
 
 def _half_extents(scene: Scene) -> list[tuple[float, float]]:
-    """Return half length and half height of every body; those without any are drawn like the others."""
+    """Return half length and half height of every body; bodies without a size get the mean of the others."""
     extents = [damper.half_extent for damper in scene.damper]
     sized = [extent for extent in extents if extent[0] > 0.0]
     a, b = np.mean(sized, axis=0) if sized else np.array([1.5, 1.0]) * max(cavity.gap for cavity in scene.cavity)
@@ -332,7 +332,7 @@ def _half_extents(scene: Scene) -> list[tuple[float, float]]:
 
 
 def _factor(scene: Scene, half: list[tuple[float, float]]) -> float:
-    """Return by how much free travels are exaggerated: as much as the drawing bears."""
+    """Return the factor by which free travels are exaggerated, the largest that fits the drawing."""
     bounds = []
     for cavity in scene.cavity:
         inside = scene.bodies_in(cavity)
@@ -349,7 +349,7 @@ def _rounded(value: float) -> float:
 
 
 def _drawn(cavity: CavityFrames) -> dict[str, Any]:
-    """Return a cavity for the player: shapes, and one entry a frame of what moves."""
+    """Return the data of a cavity for the player: shapes, and moving quantities with one entry per frame."""
     down = np.array([1.0, -1.0])
     shift = cavity.shift * (1.0, -1.0, -180.0 / math.pi)
     reach = np.abs(shift[:, 0]).max() + _WALL + 2.0

@@ -1,4 +1,4 @@
-"""The player of a motion as a page of its own: one document without requests, for a frame of another page."""
+"""The player of a motion as a separate page: one document without requests, for a frame of another page."""
 
 from __future__ import annotations
 

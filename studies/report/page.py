@@ -1,4 +1,4 @@
-"""The report: results in, one HTML page out that needs no network."""
+"""The report: one HTML page of results that needs no network."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from vanedamp.studies.report.results import ReportSection, Result, Results, form
 from vanedamp.studies.report.summary import summary
 
 _FOLDER = Path(__file__).parent
-#: scenes that a table can have side by side; more stand below each other
+#: largest number of scenes in the columns of a table; more are listed below each other
 _MOST_COLUMNS = 4
 #: headings of what templates of several sections move to one, by their calls, in the order of the page
 _COMMON = {"strength": "Strength and life", "later": "Where the energy goes"}
@@ -45,7 +45,7 @@ _SLIDERS = (
 
 @dataclass(frozen=True)
 class Page:
-    """A page while its sections are written.
+    """The state of a page while its sections are written.
 
     known   the sections by the kind of result that they show
     names   short names of the result files by path
@@ -99,12 +99,12 @@ class Page:
         return "".join(blocks)
 
     def _put_off(self, section: str, caller: Callable[[], str]) -> str:
-        """Keep a piece of a template for a common section."""
+        """Store a piece of a template for a common section."""
         self.common[section].append(caller())
         return ""
 
     def _common_sections(self) -> str:
-        """Return the pieces that were put off, below their headings."""
+        """Return the stored pieces, below their headings."""
         sections = ([f"<h2>{_COMMON[name]}</h2>", *pieces] for name, pieces in self.common.items() if pieces)
         return "".join(itertools.chain.from_iterable(sections))
 
@@ -170,12 +170,12 @@ def _environment(names: Mapping[str, str]) -> jinja2.Environment:
 
 
 def _anchor(name: str) -> str:
-    """Return the place of the page that has the provenance of a file."""
+    """Return the anchor of the provenance of a file."""
     return "from-" + re.sub(r"\W", "-", name)
 
 
 def _provenance(results: Results) -> dict[tuple[str, ...], dict[str, str]]:
-    """Return the facts of every file, by its path, and common ones by those of several; of the page itself by none."""
+    """Return the facts of files by the paths that they apply to; facts of the page itself have no path."""
     mine = versions()
     facts = {
         file: {
@@ -187,13 +187,13 @@ def _provenance(results: Results) -> dict[tuple[str, ...], dict[str, str]]:
         if result.provenance is not None
     }
     groups = {(): mine, **_by_owners(facts)}
-    for file in facts:  # equal files have their places, too
+    for file in facts:  # also for files with equal facts
         groups.setdefault((file,), {})["sha256"] = digest(file)
     return groups
 
 
 def _by_owners(tables: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, ...], dict[str, str]]:
-    """Return the entries of tables by the names of all that have them; those of many first."""
+    """Return the entries of tables by the names of all tables with them; the most common ones first."""
     owners: dict[tuple[str, str], tuple[str, ...]] = {}
     for name, table in tables.items():
         for entry in table.items():
@@ -205,7 +205,7 @@ def _by_owners(tables: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, ...],
 
 
 def _compared(scenes: Mapping[str, dict[str, str]]) -> dict[str, Any]:
-    """Return what all scenes have in common, by key, and the keys in which they differ."""
+    """Return the common values of all scenes, by key, and the keys in which they differ."""
     keys = dict.fromkeys(key for scene in scenes.values() for key in scene)
     values = {key: [scene.get(key, "") for scene in scenes.values()] for key in keys}
     common = {key: entries[0] for key, entries in values.items() if len(set(entries)) == 1}

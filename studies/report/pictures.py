@@ -21,7 +21,7 @@ from vanedamp.studies.report.mode_chart import deformed, screen_of, sharp_edges,
 if TYPE_CHECKING:
     from vanedamp.studies.report.forced_response import ForcedResponse
 
-#: part of the light that comes from all sides
+#: fraction of ambient light
 _AMBIENT = 0.55
 
 
@@ -40,7 +40,7 @@ def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
     screen = screen_of(away)
     moved, magnitude = deformed(points, shape)
     triangles, facing = moved[corners], unit_normals(moved, corners) @ away
-    # painted from the far to the near; what looks away is hidden by what does not
+    # painted from far to near; triangles facing away are hidden
     order = np.argsort(triangles.mean(axis=1) @ away, kind="stable")
     visible = order[facing[order] > 0.0]
     colours = colormaps["viridis"](magnitude[corners[visible]].mean(axis=1))

@@ -1,4 +1,4 @@
-"""Samples of bodies for a drawing in the plane: of a file, or of sliders; impacts by body, surface and corner."""
+"""Samples of bodies for a drawing in the plane, from a file or of sliders; impacts by body, surface and corner."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SURFACES = {
     "body": ("next body", {-1: ""}),
     "stop": ("stop", {-1: ""}),
 }
-#: fraction of its free travel within which a body touches
+#: a body touches a wall within this fraction of its free travel
 _TOUCHES = 1e-9
 
 
@@ -78,18 +78,18 @@ def _four(scene: Scene | None, body: int) -> bool:
 
 
 def _walk(side: str, corner: int) -> tuple[int, int]:
-    """Return the position of a contact in a counterclockwise walk through the cavity."""
+    """Return the position of a contact in counterclockwise order through the cavity."""
     corners = list(_SURFACES.get(side, ("", {}))[1])
     return [*_SURFACES, side].index(side), corners.index(corner) if corner in corners else len(corners) + corner
 
 
 def places_in_order(impacts: Sequence[ImpactsAtPlace]) -> list[str]:
-    """Return the places of impacts, in the order of a counterclockwise walk through the cavity."""
+    """Return the names of contacts with impacts, counterclockwise through the cavity."""
     return list(dict.fromkeys(site.place for site in sorted(impacts, key=lambda site: _walk(site.side, site.corner))))
 
 
 def slider_samples(scene: Scene, displacement: np.ndarray, along: np.ndarray) -> PlanarSamples:
-    """Return the samples of sliders between walls that keep their places on the floor.
+    """Return the samples of sliders between walls that are fixed to the floor.
 
     scene: without open choices; displacement: (n,) m at excitation.at; along: (n, b) m in the cavities. A floor that
     is another point of a reduced model moves as in the mode nearest to the excitation.
@@ -115,9 +115,9 @@ def slider_samples(scene: Scene, displacement: np.ndarray, along: np.ndarray) ->
 
 
 def _floor_shares(scene: Scene) -> np.ndarray:
-    """Return by how much the floor under each body (b,) moves when the response moves by one."""
+    """Return the displacement of the floor under each body (b,) per unit of the response."""
     system = assemble(scene)
-    if not system.modes:  # the base moves, and all on it
+    if not system.modes:  # everything moves with the base
         return np.ones(system.bodies)
     nearest = int(np.argmin(np.abs(np.sqrt(system.of_structure.stiffness) - system.omega)))
     at = system.of_structure.response[nearest]

@@ -1,4 +1,4 @@
-"""Results in files, the parts of a report. Each kind is read by its section, or its record (studies.kinds)."""
+"""Results in files, the input of a report. Each kind is read by its section, or its record (studies.kinds)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Result:
 
 
 class ReportSection(Protocol):
-    """The contract of a section; studies.kinds says more. Ours leave KIND, and most of them `load`, to their kind."""
+    """The contract of a section (see studies.kinds). Our own take KIND, and most of them `load`, from their kind."""
 
     KIND: str
     __file__: str
@@ -57,7 +57,7 @@ class ReportSection(Protocol):
         """Return the template's data of results by the path of their file; page: a studies.report.page.Page."""
 
     def shown(self, file: str, record: Any, page: Any) -> Any:
-        """Return the data of one result: ours have it in place of `section`, where the template's are a list of it."""
+        """Return the data of one result: our own have this instead of `section`; the template then gets a list."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def sections() -> dict[str, ReportSection]:
 
 
 def short_names(paths: Iterable[str]) -> dict[str, str]:
-    """Return the shortest ends of paths that distinguish them: file names, with folders where names are the same."""
+    """Return the shortest unique ends of paths: file names, with folders where names are equal."""
     components = {path: Path(path).resolve().parts for path in paths}
     names = {}
     for path, mine in components.items():
@@ -118,9 +118,9 @@ def short_names(paths: Iterable[str]) -> dict[str, str]:
 
 
 def collect(paths: Sequence[str | Path]) -> Results:
-    """Read the results in files, and in all files of folders that may hold any (others there are passed over).
+    """Read the results in files, and in all files of folders that may contain any (other files there are ignored).
 
-    Raises InputError for any other file, and when there is nothing to report.
+    Raises InputError for any other file, and if there is nothing to report.
     """
     by_kind = sections()
     results = Results({kind: {} for kind in by_kind})
@@ -152,7 +152,7 @@ def _folder(section: ReportSection) -> Any:
 
 
 def _scene(record: Any) -> dict[str, Any] | None:
-    """Return the scene of a record as data, with its axes in short; None: it has none."""
+    """Return the scene of a record as data, with abbreviated axes; None without a scene."""
     scene, axes = getattr(record, "scene", None), getattr(record, "axes", {})
     short = {
         path: f"{len(values)} values, {format_setting(values[0])} to {format_setting(values[-1])}"
@@ -172,7 +172,7 @@ def _endings(kinds: Iterable[str]) -> list[str]:
 
 
 def _candidates(folder: Path, kinds: Iterable[str]) -> list[Path]:
-    """Return the files of a folder that may be results; half-written ones of killed commands are hidden."""
+    """Return the files of a folder that may be results, without hidden ones, which killed commands left incomplete."""
     files = [file for ending in (".h5", *_endings(kinds)) for file in sorted(folder.glob(f"*{ending}"))]
     return [file for file in files if not file.name.startswith(".")]
 

@@ -1,4 +1,4 @@
-"""Rings in a report: amplitudes and impacts over the sectors, of runs and of sweeps."""
+"""Rings in a report: amplitudes and impacts by sector, of runs and of sweeps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _QUANTILES = (0.05, 0.5, 0.95)
 
 
 def sectors_shown(file: str, sectors: Mapping[str, Any], page: Page) -> dict[str, Any]:
-    """Return what a run of a ring shows, from the `sectors` of its JSON."""
+    """Return the template's data of a run of a ring, from `sectors` of its JSON."""
     columns = {name: np.array(sectors[name], float) for name in BY_SECTOR}
     rows = ([sector, *values] for sector, values in enumerate(zip(*columns.values(), strict=True)))
     chart = page.chart("sectors", sectors_figure(columns), ("sector", *columns), rows, [file])
@@ -64,7 +64,7 @@ def sectors_figure(columns: Mapping[str, np.ndarray]) -> go.Figure:
 
 
 def ring_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    """Return what a sweep of a ring shows: a map of its sectors, their impacts, and quantiles over seeds."""
+    """Return the template's data of a sweep of a ring: a map of its sectors, impacts, and quantiles over seeds."""
     shown: dict[str, Any] = {"file": file, "sentence": ring_sentence(sweep), "map": None, "seeds": list(_seeds(sweep))}
     if (across := _across(sweep)) is not None:
         drawn = _panels(sweep, across)
@@ -85,7 +85,7 @@ def ring_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
 
 
 def ring_sentence(sweep: Sweep) -> str:
-    """Return where a sweep of a ring has its largest amplitude, in words."""
+    """Return a sentence on the largest amplitude of a sweep of a ring."""
     mean = _ok(sweep, "sector_amplitude_mean")
     if not np.isfinite(mean).any():
         return "no point is ok, and none has a largest sector"
@@ -105,7 +105,7 @@ def _ok(sweep: Sweep, name: str) -> np.ndarray:
 
 
 def _across(sweep: Sweep) -> str | None:
-    """Return the axis of the map: that of resonances, or else the longest of numbers; None without any."""
+    """Return the axis of the map: that of resonances, or else the longest numeric axis; None without any."""
     numeric = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) > 1]
     swept = resonance_axis(sweep.scene, numeric)[0]
     return swept if swept is not None else max(numeric, key=lambda path: len(sweep.axes[path]), default=None)

@@ -1,4 +1,4 @@
-"""What sections write of strength and life: tables and charts of hot spots, and of the contacts that wear."""
+"""Strength and life in sections of the report: tables and charts of hot spots and of wearing contacts."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ def _spot(name: str, facts: Mapping[str, Any], strength: Mapping[str, Any]) -> d
 
 
 def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    """Return charts of stress, damage, wear and the like along the axis of a sweep's resonance, or its first.
+    """Return charts of stress, damage, wear and similar quantities along a sweep's resonance axis, or its first axis.
 
-    Other axes are held at their values of the worst point, which `held` names. It has the highest utilisation, or
+    Other axes are fixed at the worst point, in `held`. It has the highest utilisation, or
     without a strength the highest stress, or without stress the most of another limited quantity.
     """
     axis = resonance_axis(sweep.scene, sweep.axes)[0] or next(iter(sweep.axes))
@@ -106,7 +106,7 @@ def sweep_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
 
 
 def limited(sweep: Sweep) -> list[Quantity]:
-    """Return the quantities of a sweep that are limited, but the stress that has a chart with its linear curves."""
+    """Return the limited quantities of a sweep, except the stress, which has a chart with its linear curves."""
     quantities = (quantity for name, quantity in table().items() if name in sweep.quantities)
     return [quantity for quantity in quantities if quantity.limited and quantity.name != stress_of.name]
 
@@ -132,7 +132,7 @@ def course_chart(
 
 
 def _largest(x: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the largest values (k, s) of runs of equally many periods, and where these begin; all of few."""
+    """Return the maxima (k, s) of equal groups of periods and where the groups begin; all values of few periods."""
     starts = np.unique(np.linspace(0, len(x), _MOST_POINTS, endpoint=False).astype(int))
     return x[starts], np.maximum.reduceat(values, starts, axis=0)
 
@@ -145,7 +145,7 @@ def _curves(stress: Mapping[str, np.ndarray], spots: Sequence[str]) -> dict[str,
 
 
 def _worst(sweep: Sweep) -> tuple[int, ...]:
-    """Return the place in its grid, and the hot spot, that a sweep uses most; zeros without a run that is known."""
+    """Return the grid index and the hot spot with the largest utilisation of a sweep; zeros without a usable run."""
     first = (of_strength.name, stress_of.name, *(quantity.name for quantity in limited(sweep)))
     measures = [sweep.quantities[name] for name in first if name in sweep.quantities]
     measures = [values.reshape(*sweep.shape, -1) for values in measures]
@@ -154,7 +154,7 @@ def _worst(sweep: Sweep) -> tuple[int, ...]:
 
 
 def contacts_shown(file: str, wear: Sequence[Mapping[str, Any]], page: Page) -> dict[str, Any]:
-    """Return the contacts of a run that wear, the fastest first, and the chart of their depths."""
+    """Return the wearing contacts of a run, the fastest first, and the chart of their depths."""
     rows = sorted((item for item in wear if item["volume_rate"]), key=lambda item: -item["volume_rate"])
     worn = [item for item in rows if item["depth_rate"] is not None]
     chart: Chart | None = None

@@ -65,7 +65,7 @@ def lines_figure(x: np.ndarray, title: str, values: np.ndarray, names: Sequence[
 def haigh_figure(points: Sequence[SpotPoint]) -> go.Figure:
     """Draw permissible amplitudes over the mean stress and the hot spots, each with its utilisation.
 
-    Materials that differ have a line each; where a yield strength is known, that of yield is dashed.
+    Each material has a line; the yield line is dashed, if the yield strength is known.
     """
     figure = go.Figure()
     materials: dict[Fatigue, None] = dict.fromkeys(point.fatigue for point in points)
@@ -106,7 +106,7 @@ def _add_lines(figure: go.Figure, material: Fatigue, points: Sequence[SpotPoint]
 def lives_figure(lives: Sequence[SpotLife], unit: str = "h") -> go.Figure:
     """Draw the median lives of hot spots with their quantiles from 10 % to 90 % failure; unit: "h", "starts" ...
 
-    Hot spots without damage are named as such.
+    Hot spots without damage are labelled as such.
     """
     figure = go.Figure()
     for spot in lives:

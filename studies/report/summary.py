@@ -89,7 +89,7 @@ def _structure(results: Results, scene: Scene | None) -> tuple[str | None, dict[
 
 
 def _bodies(scene: Scene, mass: float) -> Iterator[str]:
-    """Yield a line per cavity with bodies; mass: that they are compared with, kg, nan where it is not known."""
+    """Yield one line per cavity with bodies; mass: reference for their masses, kg, nan if unknown."""
     for cavity in scene.cavity:
         inside = [damper for damper in scene.damper if damper.cavity == cavity.name]
         play = "" if cavity.play is None else f", play {1e6 * cavity.play:.4g} µm"

@@ -62,7 +62,7 @@ class TimeHistory:
 
     @classmethod
     def of(cls, response: Response, scene: Scene | None = None) -> TimeHistory:
-        """Return the history of a run; scene: that of a response that does not say."""
+        """Return the history of a run; scene: for a response without its own."""
         impacts = (event for event in response.event_list if event.kind == "impact")
         whole, bodies = _unrolled(response.scene or scene), response.body_displacement  # in a file none without bodies
         return cls(
@@ -93,7 +93,7 @@ class TimeHistory:
         return np.array([body if meets_body(side) else -1 for _, (body, side, _) in self.hits], int)
 
     def late(self) -> TimeHistory:
-        """Return the last periods only, as many as a page carries."""
+        """Return only the last periods, as many as a page can hold."""
         begin = max(self.time[-1] - _MOST_PERIODS * self.period, self.time[-_MOST_SAMPLES:][0])
         shown = self.time >= begin
         plane = None if self.plane is None else self.plane.cut(shown)
@@ -136,7 +136,7 @@ def _unrolled(scene: Scene | None) -> Scene | None:
 
 
 def history_figure(history: TimeHistory) -> go.Figure:
-    """Draw the displacement with a mark at every impact, above the bodies' places between the walls."""
+    """Draw the displacement with a mark at every impact, above the bodies' positions between the walls."""
     panels = _planar_panels(history)
     rows = 2 + len(panels) if history.bodies.shape[1] else 1
     figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.06)
@@ -200,7 +200,7 @@ def _planar_panels(history: TimeHistory) -> list[tuple[str, np.ndarray, str]]:
 
 
 def _stops(scene: Scene | None) -> list[float]:
-    """Return where the ground stops the point whose displacement is shown, m."""
+    """Return the positions of stops for the displayed displacement, m."""
     if scene is None:
         return []
     shown = [stop for stop in scene.stop if stop.to is None and stop.at in (None, scene.excitation.at)]
@@ -208,7 +208,7 @@ def _stops(scene: Scene | None) -> list[float]:
 
 
 def _walls(scene: Scene | None) -> list[float]:
-    """Return where the only bodies of their cavities end, m."""
+    """Return the limits of travel of single bodies in their cavities, m."""
     if scene is None:
         return []
     alone = [cavity.gap for cavity in scene.cavity if sum(damper.cavity == cavity.name for damper in scene.damper) == 1]
