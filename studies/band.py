@@ -1,4 +1,4 @@
-"""A band of excitation frequencies, or of speeds along an engine order, over which a study judges its scene."""
+"""A band of excitation frequencies, or of speeds along an engine order, over which a study evaluates its scene."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Values = Range | Annotated[tuple[Positive, ...], Field(min_length=1)]
 
 @dataclass(frozen=True, config=STRICT)
 class Band:
-    """Frequencies, or speeds along an engine order. TABLE: the table of the file that a derived record stands for."""
+    """Frequencies, or speeds along an engine order. TABLE: name of the table that a derived record describes."""
 
     TABLE: ClassVar[str] = ""
     band: Values | None = None
@@ -86,9 +86,9 @@ class Band:
 
 
 def file_in(record: type[File], tables: Mapping[str, Any], table: str, missing: str, path: str | Path) -> File:
-    """Return the file of a study in its tables, of a TOML file that lies at `path`, which errors name.
+    """Return the record of a study file from its tables; errors name the file's `path`.
 
-    missing: what to do without its own table. Raises InputError.
+    missing: advice in the error if the study's own table is missing. Raises InputError.
     """
     data = dict(tables)
     if table not in data:
@@ -126,13 +126,13 @@ def reference_amplitude(scene: Scene, band: np.ndarray, over_band: Literal["wors
 
 
 def at_frequency(scene: Scene, frequency: float) -> Scene:
-    """Return the scene at a frequency, Hz, of its engine order; one without an engine order as it is."""
+    """Return the scene at a frequency of its engine order, Hz; a scene without an engine order remains unchanged."""
     order = scene.excitation.engine_order
     return scene if order is None else replace(scene, rotation=Rotation(speed=speed_of(order, frequency)))
 
 
 def drive(scene: Scene, frequency: float) -> dict[str, Any]:
-    """Return what changes in a scene, at some speed with an engine order, for another frequency, Hz."""
+    """Return the changes to a scene, by path, that set an excitation frequency, Hz, or the speed that gives it."""
     order = scene.excitation.engine_order
     return {"excitation.frequency": frequency} if order is None else {"rotation.speed": speed_of(order, frequency)}
 

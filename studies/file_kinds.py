@@ -1,4 +1,4 @@
-"""The kinds of input files by name, as `vanedamp schema`, `new` and `check` know them."""
+"""The kinds of input files by name, for `vanedamp schema`, `new` and `check`."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ KINDS = {
 _WITH_SCENE = ("identification", "life", "study")
 #: stages of pipelines, lists there, whose names are tables in scenes and studies
 _STAGES = ("sweep", "ramp", "optimise", "life")
-#: what commands take besides: HDF5, and TOML of every kind
+#: further inputs of commands: HDF5 results, and TOML of every kind
 RESULT, ANY = "result", "input"
 _MESH = "a mesh, which a case names in [mesh] file"
 #: files of no kind, by their endings
@@ -61,7 +61,7 @@ _OTHERS = {".json": "JSON, for other programs", ".csv": "a table", ".html": "a p
 
 
 def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:
-    """Return the kind of a file, which its tables tell. Raises InputError for a file of no kind."""
+    """Return the kind of a file by its tables. Raises InputError for an unknown kind."""
     if any(isinstance(tables.get(name), list) for name in _STAGES):
         return KINDS["pipeline"]
     for kind in KINDS.values():
@@ -77,7 +77,7 @@ def a(kind: FileKind) -> str:
 
 
 def another_kind(path: str | Path, taken: Collection[str]) -> str:
-    """Return what a file is, and which command takes it, in words; "" if it is, or may be, of a kind that is taken.
+    """Describe a file and the command that takes it; "" if it is, or may be, of an accepted kind.
 
     taken: names of KINDS, RESULT, ANY.
     """
@@ -103,6 +103,6 @@ def another_kind(path: str | Path, taken: Collection[str]) -> str:
 
 
 def expected(taken: Collection[str]) -> str:
-    """Return the kinds that are taken, in words."""
+    """Return the accepted kinds in words."""
     general = {RESULT: "a result (HDF5)", ANY: "an input file (TOML)"}
     return " or ".join(general.get(name) or f"{a(KINDS[name])} ([{KINDS[name].tables[0]}])" for name in taken)

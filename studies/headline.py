@@ -1,7 +1,7 @@
 """The key results of a damped curve: its peak over that of the curve without bodies, in the same range.
 
-The linear curves are known between the points of a sweep, the damped one at its points only; so the headline says how
-many of these are left out, whether the peak lies at an edge of the range, and whether the points are too coarse.
+Linear curves are known between the points of a sweep, the damped one only at the points. So the headline reports how
+many points are left out, whether the peak lies at an edge of the range, and whether the points are too coarse.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy as np
 
 from vanedamp.files.toml_input import plain
 
-#: fraction of the numbers around it below which a result is round-off
+#: results below this fraction of their scale are round-off
 _ROUND_OFF = 1e-12
 
 
 class _Top(NamedTuple):
-    """Highest value of a curve, m, its place on the axis, and whether that is an edge of a range of frequencies."""
+    """Maximum of a curve, m, its position on the axis, and whether this is an edge of a range of frequencies."""
 
     height: float
     at: Any
@@ -35,8 +35,8 @@ class Headline:
     damped_peak_at               its place on the axis
     undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all fixed, over the same range
     attached_mass_fraction       at the damped peak
-    onset                        first place with impacts on walls (of sliders in one cavity, or between them)
-    touched_below                first place below it where a body hits its floor or ceiling only, or another body
+    onset                        first position with impacts on walls (of sliders in one cavity, or between them)
+    touched_below                first position below it where a body hits only its floor or ceiling, or another body
     peak_at_edge, undamped_at_edge, fixed_at_edge   whether a peak lies at an edge of the frequencies: no resonance's
     spacing, half_power_width    Hz, or units of a speed along an engine order: widest step next to the peaks that are
                                  resonances, and width of the undamped one
@@ -72,12 +72,12 @@ class Headline:
 
     @property
     def maximum_ratio(self) -> float:
-        """The largest damped amplitude over the undamped peak: what high-cycle fatigue counts."""
+        """The largest damped amplitude over the undamped peak, which governs high-cycle fatigue."""
         return self.relative(self.damped_maximum)
 
     @property
     def too_coarse(self) -> bool:
-        """Say whether a step next to a resonance is wider than the resonance: a peak may hide there."""
+        """Whether a step next to a resonance is wider than the resonance, so that a peak may be missed."""
         return self.spacing > self.half_power_width > 0.0
 
     @property
@@ -215,7 +215,7 @@ def _top(x: np.ndarray, curve: np.ndarray, along_frequency: bool) -> _Top:
 
 
 def _step(x: np.ndarray, at: float) -> float:
-    """Return the widest step of ascending points (n,) that a place lies in; beyond them, its distance."""
+    """Return the widest step of ascending points (n,) that contains a position; outside their range, its distance."""
     if not x[0] <= at <= x[-1]:
         return float(np.abs(x - at).min())
     left, right = np.searchsorted(x, at, "left"), np.searchsorted(x, at, "right")

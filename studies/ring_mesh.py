@@ -1,4 +1,4 @@
-"""The mesh of a whole ring: that of one sector turned N times, with the nodes of the joints once."""
+"""The mesh of a whole ring: that of one sector rotated N times, with the nodes of the joints merged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from vanedamp.modal.algebra import rotation, turns
 from vanedamp.modal.records.ring_modes import RingModes
 
-#: distance up to which nodes of two sectors are one, over the sector's size
+#: distance relative to the sector's size up to which nodes of two sectors are merged
 _SAME = 1e-4
 
 
@@ -29,7 +29,7 @@ class WholeRing(NamedTuple):
     cells: np.ndarray
 
     def shape(self, modes: RingModes, mode: int) -> np.ndarray:
-        """Return the complex shape (n, 3) of a mode: the wave is Re(shape exp(i phase)); real where it stands."""
+        """Return the complex shape (n, 3) of a mode: the wave is Re(shape exp(i phase)); real for a standing wave."""
         real, imaginary = (modes.whole(mode, phase)[self.sector, self.node] for phase in (0.0, -np.pi / 2.0))
         return real if 2 * abs(modes.diameters[mode]) in (0, modes.sectors) else real + 1j * imaginary
 

@@ -1,4 +1,4 @@
-"""Files to start from: a scene, a case and a study that work as they are, with what their keys mean."""
+"""Template files: a scene, a case and a study that work unchanged, with comments on their keys."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vanedamp.studies.hot_spots import plus_minus
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
 #: frequency of a body on its contact over the resonance's, at least and at most
 _STIFFNESS = (10.0, 30.0)
-#: over the natural frequency: a run that shows the body at work, and the ends of a sweep and of a study's band
+#: relative to the natural frequency: a run in which the body is active, and the ends of a sweep and of a study's band
 _RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
 
 _SCENE_NOTE = """\
@@ -232,7 +232,7 @@ def _pocket(model: ReducedModel, label: str) -> tuple[float, float] | None:
 
 
 def _beside(file: Path, folder: Path) -> str:
-    """Return the name of a file as one in a folder says it."""
+    """Return the path of a file relative to a folder."""
     file, folder = file.resolve(), folder.resolve()
     return str(file.relative_to(folder) if file.is_relative_to(folder) else file)
 

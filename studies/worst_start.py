@@ -1,4 +1,4 @@
-"""A chosen damper over its band from other starts: at rest, and from the last state of its neighbour, up and down."""
+"""A damper over its band from several starts: at rest, and from the last state of the neighbour, up and down."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import finite
 from vanedamp.studies.band import drive
 
-#: directions of a sweep, and how their runs begin, in words
+#: directions of a sweep, and their starts in words
 STARTS = {"independent": "at rest", "up": "going up", "down": "going down"}
 
 
@@ -53,7 +53,7 @@ def worst_start(
 
 
 def worst_words(told: dict[str, Any]) -> str:
-    """Return the worst over starts for people: its highest mean of peaks, and the largest amplitude."""
+    """Return the worst over starts in words: its highest mean of peaks, and the largest amplitude."""
     if told["starts"] == 1:
         return "one start only: every run begins as the scene"
     if told["peak_ratio"] is None:
