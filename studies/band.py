@@ -138,6 +138,6 @@ def drive(scene: Scene, frequency: float) -> dict[str, Any]:
 
 
 def ends(scene: Scene, band: np.ndarray) -> tuple[float, float]:
-    """Return the ends of a band of frequencies (f,), Hz, as `linear_peaks` takes them."""
+    """Return the ends of a band of frequencies (f,), Hz, as arguments of `linear_peaks`."""
     low, high, order = float(band[0]), float(band[-1]), scene.excitation.engine_order
     return (low, high) if order is None else (speed_of(order, low), speed_of(order, high))

@@ -54,7 +54,7 @@ _STAGES = ("sweep", "ramp", "optimise", "life")
 #: further inputs of commands: HDF5 results, and TOML of every kind
 RESULT, ANY = "result", "input"
 _MESH = "a mesh, which a case names in [mesh] file"
-#: files of no kind, by their endings
+#: other files, by their endings
 _OTHERS = {".json": "JSON, for other programs", ".csv": "a table", ".html": "a page"} | dict.fromkeys(
     (".msh", ".inp", ".bdf", ".nas", ".unv"), _MESH
 )

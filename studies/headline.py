@@ -29,7 +29,7 @@ class _Top(NamedTuple):
 
 @dataclass(frozen=True)
 class Headline:
-    """The results of a damped curve; nan or None where there is none.
+    """The results of a damped curve; nan or None for missing ones.
 
     damped_peak, damped_maximum  m, highest mean of the periods' peaks, and highest absolute maximum
     damped_peak_at               its place on the axis

@@ -15,7 +15,7 @@ _UNITS = {"rotation": ("Pa s^2/rad^2", 1.0)}
 _MPA = ("MPa", 1e-6)
 #: estimated relative error of a stress above which commands warn
 DOUBTFUL = 0.3
-#: what warnings call the amplitude at the fatigue strength
+#: name of the amplitude at the fatigue strength in warnings
 _LEVEL = "the amplitude at the fatigue strength"
 
 

@@ -35,7 +35,7 @@ class WholeRing(NamedTuple):
 
 
 def joints(modes: RingModes, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes (k,) of a sector's low face and, in the same order, those of its high face, which they meet."""
+    """Return the nodes (k,) of a sector's low face and, in the same order, the matching nodes of its high face."""
     turn = rotation(modes.axis, modes.angle)
     away, nearest = cKDTree(coordinates).query((coordinates - modes.point) @ turn.T + modes.point)
     low = np.flatnonzero(away <= _SAME * np.linalg.norm(np.ptp(coordinates, axis=0)))

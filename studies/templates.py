@@ -115,7 +115,7 @@ def _case(file: Path) -> Template:
 def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
     """Return a scene with gap and mass of a good damper, by the resonance of its structure.
 
-    blocks: bodies are blocks where a reduced model has the motion and the size of their cavity; they take longer.
+    blocks: use blocks where a reduced model has the motion and the size of their cavity; these runs take longer.
     """
     shipped = FigureStructure.shipped()
     amplitude = _rounded(shipped.amplitude, 2)
@@ -196,10 +196,10 @@ def _on_model(
 
 
 def _contact_stiffness(model: ReducedModel, cavities: list[dict[str, Any]], resonance: Resonance, mass: float) -> float:
-    """Return the stiffness of a contact, N/m: that of the softest wall under a static force, without the resonance.
+    """Return the stiffness of a contact, N/m: the static stiffness of the softest wall, without the resonance.
 
     Body and contact alone vibrate at _STIFFNESS times the resonance's frequency at least and at most: softer contacts
-    overlap by much of the gap, harder ones only take longer.
+    overlap by much of the gap, stiffer ones only increase the run time.
     """
     labels = {cavity.get(side, cavity["floor"]) for cavity in cavities for side in ("left", "right")}
     rows = [model.interface.index(label) for label in labels]

@@ -67,7 +67,7 @@ class _Alone:
 
     def enter(self, title: str) -> str:
         """Show another stage, or none (""). Returns the one before."""
-        with self.lock:  # a line that is due now comes before what follows the stage, or not at all
+        with self.lock:  # a line that is due is printed before the stage ends, or not at all
             before, self.title = self.title, title
         if self.timer is not None:
             self.timer.cancel()

@@ -44,7 +44,7 @@ class MeasuredDamping:
     """The damping of the first bending in a measured response.
 
     file      of the measurement
-    response  what was measured in the band and half its width around it
+    response  measured in the band and half its width around it
     band      Hz, where poles were fitted
     poles     of the fit; `pole` is the one of the first bending
     """
@@ -177,7 +177,7 @@ class Calibration:
 
 
 def calibrate(case: Case, checkpoint: str | Path | None = None) -> Calibration:
-    """Tune the stiffness if frequencies are given, take the damping from a response if one is given, then calibrate.
+    """Tune the stiffness to frequencies and take the damping from a response, if these are given, then calibrate.
 
     checkpoint: a file to which evaluations of the tuning are written and from which an interrupted call resumes; the
     caller removes it after the result is saved (files.checkpoint_file.clear).
@@ -319,7 +319,7 @@ def _tuning_json(tuning: Tuning, case: Case) -> dict[str, Any]:
 
 
 def parts_by_name(case: Case, volumes: Iterable[str]) -> dict[str, list[str]]:
-    """Return every name that `vary` may hold, with the parts of Solid.stiffness_parts that it stands for."""
+    """Return every permitted name of `vary`, with its parts of Solid.stiffness_parts."""
     groups = list(volumes)
     names = {f"material.{group}": [f"material.{group}"] for group in groups}
     default_groups = [f"material.{group}" for group in groups if group not in case.material]

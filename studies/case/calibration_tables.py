@@ -1,4 +1,4 @@
-"""The tables [calibration] and [hot_spots] of a case: measurements, what is tuned to them, where strength counts."""
+"""The tables [calibration] and [hot_spots] of a case: measurements, tuned parameters, and where strength counts."""
 
 from __future__ import annotations
 

@@ -29,8 +29,8 @@ def ring_interference(
 ) -> Interference:
     """Return the interference of the modes of a structure's ring with engine orders.
 
-    operating: lowest and highest speed, rad/s, by default those of [campbell], or 5 % about that of [rotation];
-    orders: by default those of [campbell], or 1 to the number of sectors; report: called with the number of diameters
+    operating: lowest and highest speed, rad/s, by default from [campbell], or 5 % around the speed of [rotation];
+    orders: by default from [campbell], or 1 to the number of sectors; report: called with the number of diameters
     done and their total, for the Campbell diagram; checkpoint: as for campbell_diagram. Raises InputError for
     an engine order that is no whole number.
     """

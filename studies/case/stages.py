@@ -60,7 +60,7 @@ from vanedamp.studies.terminal import stage
 
 # a mode within this relative distance of the first bending is reported if its relative compliance exceeds the limit
 _NEAR, _NOTABLE = 0.02, 0.01
-#: modes that are computed unless the case says; frequency up to which a reduced model is judged, over the first bending
+#: default number of modes; frequency up to which a reduced model is evaluated, relative to the first bending
 MODES, _REACH = 10, 1.5
 _UNCOUNTED = (
     "modes: found iteratively: spare modes guard against a missed one, but only factors prove that there is none "
@@ -181,7 +181,7 @@ class FatigueLevel:
 
     share      fraction of the strength
     amplitude  m, displacement of the response coordinate
-    spot       where the stress does; its stress is that of the amplitude 1 m
+    spot       where the stress reaches it; its stress is for an amplitude of 1 m
     peaks      of every volume group, for this amplitude, from which other strengths give another level
     moved      displacement of the response coordinate over the structure's largest one
     """
@@ -415,7 +415,7 @@ def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[
 
     It is the mode most similar to the case's shape, or the one with most effective mass along its direction.
 
-    Raises ParticipationError for a held structure whose lowest modes lack it.
+    Raises ParticipationError for a supported structure without it among the lowest modes.
     """
     elastic = np.flatnonzero(modes.frequencies_hz > 0.0)
     rigid = len(modes) - elastic.size

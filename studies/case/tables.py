@@ -155,7 +155,7 @@ def _gather(table: Any) -> Any:
     common = {key: table[key] for key in ("generator", "degree") if key in table}
     parameters = {key: value for key, value in table.items() if key not in common}
     for key, value in parameters.items():
-        if isinstance(value, str):  # the generators' records would take "3" for 3
+        if isinstance(value, str):  # the generators' records would convert "3" to 3
             raise ValueError(f"{key}: expected a number, not {value!r}")
     return common | {"parameters": parameters}
 
@@ -275,7 +275,7 @@ _Material = Annotated[
     Discriminator(_kind_of_material),
     BeforeValidator(_one_kind),
 ]
-#: below [material]: the materials, and fatigue data for all of them, of which `_spread` leaves the former
+#: tables of [material]: materials, and fatigue data for all of them, which `_spread` merges into the former
 _Materials = Annotated[
     dict[
         str,
@@ -286,7 +286,7 @@ _Materials = Annotated[
 ]
 
 
-#: facet groups with the components that are held
+#: facet groups with their fixed components
 _Components = dict[str, Annotated[str, Field(pattern="^[xyz]+$")]]
 _Clamped = _Components | list[str | _Components]
 

@@ -1,4 +1,4 @@
-"""`vanedamp check`: what an input file means, without running it."""
+"""`vanedamp check`: explain an input file without running it."""
 
 from __future__ import annotations
 

@@ -49,8 +49,8 @@ class DampedCurve:
     undamped, fixed            linear curves without bodies and with all fixed
     attached, impacts          attached mass fraction and impacts per period
     periodic                   whether the response repeats
-    starts                     of the runs, in words; empty where there was one
-    each                       the curves of all starts by these words, of which this is the worst; else empty
+    starts                     of the runs, in words; empty for a single start
+    each                       the curves of all starts by these words, if this is the worst of them; else empty
     """
 
     name: str

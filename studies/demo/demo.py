@@ -75,7 +75,7 @@ def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> P
 
     Case and scenes are written as a user would write them, with a pipeline file that reproduces all results.
 
-    rigid: take the shipped rigid model and leave out what needs finite elements.
+    rigid: use the shipped rigid model and omit all parts that need finite elements.
     """
     started = time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)

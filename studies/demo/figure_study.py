@@ -39,8 +39,8 @@ CASE = f"#:schema ./{schema_name('case')}\n" + (FOLDER / "case.toml").read_text(
 class Session:
     """Folder, pool and effort of studies.
 
-    pool: of processes, None for this one; effort: less than the figures' files say; resume: continue from checkpoints
-    that the folder has.
+    pool: of processes, None for this one; effort: changes of the figures' files; resume: continue from checkpoints
+    in the folder.
     """
 
     structure: FigureStructure

@@ -19,14 +19,14 @@ FORMATS = ExtensionPoint(
     "format of exports", "vanedamp.studies.export.formats", "vanedamp.export_formats",
     ("SUMMARY", "ENDINGS", "WRITERS", "OPTIONS"),
 )  # fmt: skip
-#: the kind of a writer that takes results of every kind
+#: the kind of a writer for results of every kind
 ANY = "*"
 #: roles of options that name a file
 INPUT, OUTPUT = "input", "output"
 
 
 class Format(Protocol):
-    """The contract of a format; the folder `formats` says more."""
+    """The contract of a format, described in the folder `formats`."""
 
     SUMMARY: str
     ENDINGS: tuple[str, ...]

@@ -122,7 +122,7 @@ def beginning(scene: Scene) -> float:
 
 
 def run_seconds(scene: Scene) -> float:
-    """Return the processor time of a run, s, of one body on a rigid structure: richer scenes take more."""
+    """Return the processor time of a run, s, of one body on a rigid structure: larger scenes take more."""
     return beginning(scene) + scene.time.simulated * scene.solver.seconds_per_period
 
 

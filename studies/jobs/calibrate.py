@@ -51,7 +51,7 @@ def _sentence(calibration: Calibration) -> str:
 
 
 def _summary(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what was tuned, the rigid model and the excitation."""
+    """Yield the tuned parameters, the rigid model and the excitation."""
     tuning = result["tuning"]
     if tuning:
         yield "target/Hz      before         after          MAC"

@@ -25,7 +25,7 @@ from vanedamp.files.store import clear_leftovers
 from vanedamp.studies.scene_checks import check_moved, check_numbers
 from vanedamp.studies.terminal import progress, stage
 
-#: takes the path of a file and writes it
+#: writes the file at a path
 Write = Callable[[str], object]
 
 
@@ -106,7 +106,7 @@ class Job(ABC):
 
     #: of its progress
     TITLE: ClassVar[str]
-    #: whether it takes worker processes
+    #: whether it uses worker processes
     PARALLEL: ClassVar[bool] = False
 
     @classmethod
@@ -198,7 +198,7 @@ class SceneJob(Job):
 
     @classmethod
     def check_scene(cls, scene: Scene, source: str) -> None:
-        """Raise InputError for a scene that the job does not take."""
+        """Raise InputError for a scene that the job does not accept."""
         check_moved(scene)
         check_numbers(scene, source)
 

@@ -82,7 +82,7 @@ class SweepJob(SceneJob):
         return points
 
     def check(self, workers: int) -> None:
-        """Reject more points than anyone needs, or what takes a month."""
+        """Reject too many points, or a sweep that takes a month."""
         check_sweep(self.of, workers)
         if self.peak is not None:
             check_run(self.of, PEAK_SAMPLES)
@@ -92,7 +92,7 @@ class SweepJob(SceneJob):
         return choice_notes(self.points.estimate, self.points.advice)
 
     def warnings(self) -> Iterable[str]:
-        """Return those of the points."""
+        """Return the warnings of the points."""
         return self.points.warnings
 
     def finished(self, checkpoint: Path | None) -> int:
@@ -134,7 +134,7 @@ def peak(points: Grid, result: Sweep, path: str) -> tuple[str, dict[str, Write]]
 
     Points that began with the state of a neighbour do not count, as a single run would end in another motion. Returns a
     note with the name of its file (path), and by the option `peak` the function that writes the file, if
-    there is such a point.
+    such a point exists.
     """
     mean = np.where(result.status == "ok", result.amplitude_mean_dynamic, -np.inf)
     directions = points.axes.get("continuation.direction", ())

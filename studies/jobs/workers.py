@@ -1,6 +1,6 @@
 """Process pools: for sweeps, and for a single task.
 
-Why not loky: its workers (3.7.0) import and load the compiled engine each by itself. Two of them have 67 MB of their
+Why not loky: each of its workers (3.7.0) imports and loads the compiled engine. Two of them have 67 MB of their
 own memory each and finish eight runs of a small scene after 2.5 s; these are forked from a server that has loaded it
 (`preloaded`): 11 MB and 2.1 s.
 """

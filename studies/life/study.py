@@ -97,7 +97,7 @@ class WearContact(NamedTuple):
 
 
 class LifeStudy(NamedTuple):
-    """A scene, its [life] table, and what its curves refer to.
+    """A scene, its [life] table, and the reference of its curves.
 
     frequencies: (f,) Hz of the band. reference: amplitude without bodies in the band, m, or the limit of what counts.
     """

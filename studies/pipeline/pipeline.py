@@ -70,7 +70,7 @@ def pipeline(
     the results, so that a killed run resumes, jobs from their checkpoints.
 
     folder: of the results, by default the one that the file names; workers: processes of jobs, by default one for
-    every core; dry_run: only say what would run; note: takes a line as stages begin and end. Raises InputError, with
+    every core; dry_run: name what would run; note: prints a line as stages begin and end. Raises InputError, with
     the stage's file: nothing has run then if the file, the case or a scene is bad, or would take a month.
     """
     started = time.perf_counter()

@@ -81,7 +81,7 @@ class Stage(ABC):
     name     in printed lines and records
     file     that its errors are about
     outputs  files that it writes
-    takes    outputs of earlier stages that it reads
+    takes    outputs of earlier stages, its inputs
     """
 
     #: options that name the outputs of its job
@@ -395,7 +395,7 @@ def _without_level(inputs: Inputs, strengths: bool = False) -> dict[str, Any]:
 
 
 def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage]:
-    """Yield the stages of a pipeline file with results in a folder, each after those that it takes from."""
+    """Yield the stages of a pipeline file with results in a folder, each after the stages that it depends on."""
     base, folder = source.resolve().parent, folder.resolve()
     results: list[Path] = []
     case, tuned = (base / (pipeline.case or "")).resolve(), tuple[Path, ...]()

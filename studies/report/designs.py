@@ -67,7 +67,7 @@ class DesignCurves:
 def designs(responses: Iterable[ForcedResponse]) -> list[DesignCurves]:
     """Return the designs of curves, best first: the best has the lowest damped peak of its worst curve.
 
-    Peaks are relative to those without bodies. Designs are at the end if a point that is not ok may be their peak.
+    Peaks are relative to peaks without bodies. Designs whose peak may be at a failed point come last.
     """
     curves = list(responses)
     heights = np.array([curve.headline.peak_ratio for curve in curves])

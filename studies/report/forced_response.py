@@ -56,7 +56,7 @@ class ForcedResponse(Measured):
     settings           values of the sweep's other axes by path
     source             the file it comes from
     peak_known         whether the peak is certain: no failed point can be higher
-    design, start      what stands for the numbers of its scene that the designer chooses, and for how its runs begin
+    design, start      identifiers of the parameters that the designer chooses, and of the start of its runs
     """
 
     name: str

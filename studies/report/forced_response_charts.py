@@ -74,8 +74,8 @@ def _add_amplitude(
 def jumps(mean: np.ndarray, confidence: np.ndarray, reference: float) -> np.ndarray:
     """Return the places (k,) of the points before which a curve of means (n,) jumps: another motion begins there.
 
-    A jump is larger than the confidence of its ends, than a small fraction of the reference, and than what the curve
-    changes by around it.
+    A jump exceeds the confidence of its ends, a small fraction of the reference, and the changes of the
+    curve around it.
     """
     if len(mean) < 2:
         return np.zeros(0, int)
@@ -163,7 +163,7 @@ def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str]
 
 
 def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Draw where the energy goes: stacked fractions of the losses, one panel per response, each with a point."""
+    """Draw the energy losses: stacked fractions, one panel per response with a point."""
     columns = min(len(responses), _PANELS)
     rows = -(-len(responses) // columns)
     # names are wrapped to the width of a panel
@@ -176,7 +176,7 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
         vertical_spacing=(above + below) / (height - above - below) if rows > 1 else 0.0,
     )  # fmt: skip
     for number, response in enumerate(responses):
-        pieces = _known(np.isfinite(response.energy_share).all(axis=1))  # in a stack, plotly takes what is not for zero
+        pieces = _known(np.isfinite(response.energy_share).all(axis=1))  # plotly treats gaps in a stack as zero
         for (piece, points), (index, loss) in itertools.product(enumerate(pieces), enumerate(LOSSES)):
             if not any((response.energy_share[:, index] > 0).any() for response in responses):
                 continue
@@ -213,7 +213,7 @@ def _wrapped(name: str, width: int) -> list[str]:
 
 
 def plane_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
-    """Draw largest tilt, fraction of the time off the floor and what small tilts neglect, of each body in the plane.
+    """Draw largest tilt, airborne fraction of the time and error by assuming small tilts, of each planar body.
 
     shown: as of `responses_figure`.
     """
@@ -251,7 +251,7 @@ def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int)
     hertz = orders.pop() if len(orders) == 1 else math.nan
     figure.update_xaxes(hoverformat=".6g")
     for axis in figure.select_xaxes():
-        if axis.showticklabels is not False:  # of panels above each other, the lowest carries the title
+        if axis.showticklabels is not False:  # only the lowest panel has the title
             axis.update(title_text=axis_title(responses[0].axis, responses[0].units, hertz))
     figure.update_layout(hovermode="x unified")
     return dressed(figure, height)

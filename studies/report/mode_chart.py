@@ -17,7 +17,7 @@ _MOST_MODES = 12
 _DISTANCE = 2.3  # of the eye, in sizes of the scene
 #: views from which the best is taken, degrees; cells of a coarse screen across the structure
 _AZIMUTHS, _ELEVATION, _SCREEN = (25.0, 70.0, 115.0, 160.0, 205.0, 250.0, 295.0, 340.0), 18.0, 24
-_NEAR = 0.03  # around hot spots, in sizes of the structure: what is to be seen of them
+_NEAR = 0.03  # radius around hot spots that the view shows, in sizes of the structure
 _EXAGGERATION = 0.06  # largest displacement, as a fraction of the structure's size
 # cells by their number of nodes: faces by corners, as VTK counts them
 _TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))

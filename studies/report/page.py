@@ -33,7 +33,7 @@ from vanedamp.studies.report.summary import summary
 _FOLDER = Path(__file__).parent
 #: largest number of scenes in the columns of a table; more are listed below each other
 _MOST_COLUMNS = 4
-#: headings of what templates of several sections move to one, by their calls, in the order of the page
+#: headings of common sections, filled by templates of several sections, by their calls, in the order of the page
 _COMMON = {"strength": "Strength and life", "later": "Where the energy goes"}
 #: scripts of the page by the kind of chart that needs them
 _SCRIPTS = {"motion.js": "motion", "modes.js": "mode", "curves.js": "response", "ring.js": "ring"}
@@ -78,7 +78,7 @@ class Page:
         return Chart(name, html, csv_text(motion.header(), motion.rows()), tuple(files))
 
     def blocks(self) -> str:
-        """Return the sections of all results, as HTML; those of a study have its title."""
+        """Return the sections of all results, as HTML; sections of a study have its title."""
         studies: list[tuple[ClaimStudy | None, set[str]]] = [
             (result.record, set(self.results.parts(file))) for file, result in self.results.kinds[CLAIMS].items()
         ]

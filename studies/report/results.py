@@ -37,7 +37,7 @@ class Result:
 
     @classmethod
     def of(cls, record: Any, scene: Mapping[str, Any] | None = None) -> Result:
-        """Return the result of a record with a provenance, whose scene the page shows by itself."""
+        """Return the result of a record with a provenance, without the scene, which the page shows separately."""
         return cls(
             record, {key: value for key, value in getattr(record, "provenance", {}).items() if key != "scene"}, scene
         )

@@ -20,7 +20,7 @@ CURVES = {"with the bodies": "solid", "without bodies": "dot", "bodies fixed": "
 
 
 class SpotPoint(NamedTuple):
-    """A hot spot in the figures: its name, amplitude and mean of the stress that counts, Pa, and fatigue data."""
+    """A hot spot in the figures: name, amplitude and mean of its equivalent stress, Pa, and fatigue data."""
 
     name: str
     amplitude: float

@@ -194,7 +194,7 @@ def _planar_panels(history: TimeHistory) -> list[tuple[str, np.ndarray, str]]:
     lift, tilt = 1e6 * history.plane.body_lift, 1e3 * history.plane.body_tilt.copy()
     if history.scene is not None:
         discs = np.array([damper.form.rolls for damper in history.scene.damper])
-        if np.isfinite(tilt[:, ~discs]).any():  # next to the turns of discs, tilts would not show
+        if np.isfinite(tilt[:, ~discs]).any():  # rotations of discs would hide tilts
             tilt[:, discs] = np.nan
     return [("above the floor, µm", lift, "µm"), ("tilt, mrad", tilt, "mrad")]
 

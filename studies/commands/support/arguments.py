@@ -1,4 +1,4 @@
-"""Arguments that several commands take, and the types of their values."""
+"""Arguments of several commands, and the types of their values."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ def write_result(
 ) -> None:
     """Write the results of a command. All files appear together, or none.
 
-    result: as JSON to the file of `--json`, or to standard output (-), which takes nothing else then
+    result: as JSON to the file of `--json`, or alone to standard output (-)
     lines: printed on standard output
     warnings: about the input file, on standard error
     files: by the option that names the file, if it is given, the function of its path that writes it

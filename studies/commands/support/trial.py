@@ -104,7 +104,7 @@ def _follow(run: Run, periods: int, seconds: float, marks: Sequence[int] = ()) -
 def _near_steady(scene: Scene) -> RestartState | None:
     """Return the linear steady state, of the smaller amplitude without bodies and with bodies fixed.
 
-    None where there is none, or runs of the scene's method cannot begin with it.
+    None if there is none, or if the scene's method cannot start from it.
     """
     if scene.excitation.signal is not None or isinstance(scene.structure, Prescribed) or why_no_restart(scene):
         return None

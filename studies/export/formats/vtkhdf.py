@@ -1,4 +1,4 @@
-"""VTKHDF, the file format of VTK for fields on meshes that move: modes, a mode over its phase, responses over time.
+"""VTKHDF, the file format of VTK for fields on moving meshes: modes, an animated mode, responses versus time.
 
 Written after VTK's specification (VTKHDF 2.0, UnstructuredGrid with Steps), which meshio does not write: mesh and cells
 once, fields per step.

@@ -15,7 +15,7 @@ RECORD = "vanedamp.studies.case.calibration_record.CalibrationRecord"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     calibration = CalibrationRecord.load(record.path)
     yield Fact("rigid", asdict(calibration.rigid), "", "rigid model, SI units")
     if calibration.part:

@@ -15,7 +15,7 @@ RECORD = "vanedamp.Campbell"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     of = {name: variable.values for name, variable in record.variables.items()}
     rpm = of["speed"] * 30 / np.pi
     yield Fact("rpm", [float(rpm[0]), float(rpm[-1])], "", "lowest and highest speed")

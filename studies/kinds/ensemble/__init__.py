@@ -17,7 +17,7 @@ RECORD = "vanedamp.Ensemble"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     ensemble = Ensemble.load(record.path)
     yield Fact("ranges", {path: list(ends) for path, ends in ensemble.scene.ranges.items()})
     yield Fact("samples", len(ensemble.status))

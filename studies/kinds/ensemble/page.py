@@ -1,4 +1,4 @@
-"""Ensembles: curves with bands, quantiles of the reduction, and what its spread is due to."""
+"""Ensembles: curves with bands, quantiles of the reduction, and causes of its spread."""
 
 from __future__ import annotations
 

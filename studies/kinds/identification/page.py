@@ -24,7 +24,7 @@ from vanedamp.studies.report.page import Page
 
 ORDER = 57
 figure = data_figure
-#: panels side by side, height of a row of them, and of what is around them
+#: columns of panels, height of a row of panels, and height around the panels
 _COLUMNS, _HEIGHT, _LEGEND = 3, 320, 120
 _DATA = "Measurements, and the model with its 95 % band; open circles are means of motions that do not repeat."
 _PROFILES = (
@@ -43,7 +43,7 @@ def shown(file: str, record: Identification, page: Page) -> dict[str, Any]:
 
 
 def _numbers(record: Identification) -> list[tuple[Any, ...]]:
-    """Return a row per number: path, unit, value, deviation, ends of the interval and whether they are bounds."""
+    """Return one row per number: path, unit, value, deviation, ends of the interval and whether they are bounds."""
     columns = (record.best, np.sqrt(record.covariance.diagonal()), record.interval, record.open)
     rows = zip(record.paths, *(column.tolist() for column in columns), strict=True)
     return [(path, unit_of(path), *rest) for path, *rest in rows]
@@ -70,7 +70,7 @@ def _charts(file: str, record: Identification, page: Page) -> Iterator[tuple[str
 
 
 def _data_table(record: Identification) -> Table:
-    """Return measured values with those of the model."""
+    """Return measured and modelled values."""
     names = ("data_at", "data_value", "data_deviation", "data_model", "data_band")
     of = [f"{channel['measurement']} {channel['quantity']}" for channel in record.channels]
     columns = zip(*(getattr(record, name).tolist() for name in ("data_channel", *names)), strict=True)

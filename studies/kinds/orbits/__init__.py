@@ -17,7 +17,7 @@ RECORD = "vanedamp.Branches"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     branches = Branches.load(record.path)
     yield Fact("parameter", branches.parameter)
     data = branches.to_json()

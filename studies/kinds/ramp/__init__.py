@@ -16,7 +16,7 @@ RECORD = "vanedamp.Ramp"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     ramp = Ramp.load(record.path)
     data = ramp.to_json()
     yield Fact("runs", [

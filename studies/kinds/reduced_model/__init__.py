@@ -16,7 +16,7 @@ RECORD = "vanedamp.ReducedModel"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     provenance = record.attributes.get("provenance", {})
     frequencies = record.variables["natural_frequency"].values
     yield Fact("frequency_hz", frequencies[:MOST].tolist(), "Hz", "natural frequencies")

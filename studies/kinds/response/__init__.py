@@ -17,7 +17,7 @@ _OF_RUN = ("status", "classification", "frequency", "periods", "transient")
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     of = units()
     names = [*_OF_RUN[:3], *(name for name, quantity in table().items() if not quantity.dims), *_OF_RUN[3:]]
     for name in names:

@@ -14,7 +14,7 @@ RECORD = "vanedamp.RingDown"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     result = RingDown.load(record.path)
     half = result.half_cycles
     yield Fact("status", result.status.value)

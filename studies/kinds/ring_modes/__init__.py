@@ -16,7 +16,7 @@ RECORD = "vanedamp.Interference"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     ring = Interference.load(record.path)
     yield Fact("sectors", ring.modes.sectors)
     yield Fact("speed", ring.speed, "rad/s")

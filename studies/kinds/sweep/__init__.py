@@ -17,7 +17,7 @@ RECORD = "vanedamp.Sweep"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     sweep = Sweep.load(record.path)
     units = sweep.units()
     ends = {path: f"{values[0]} to {values[-1]} {units[path]}".strip() for path, values in sweep.axes.items()}

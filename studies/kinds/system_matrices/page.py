@@ -25,7 +25,7 @@ def shown(file: str, record: SystemMatrices, page: Page) -> dict[str, Any]:
 
 
 def figure(record: SystemMatrices) -> go.Figure:
-    """Draw the nodes: free, fixed and those of patches."""
+    """Draw the nodes: free, fixed and on patches."""
     drawn = go.Figure()
     count = len(record.coordinates)
     held = np.unique(record.fixed // 3)
