@@ -15,7 +15,7 @@ from paper.claims_systems import means_of
 from paper.figure_scenes import Bar
 from vanedamp.studies.demo import claims as shown
 from vanedamp.studies.demo.claims import Curves, claim, verdict
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.report.claims import Claim
 
 _BARS = ("light", "nominal", "heavy", "light_same_gap", "nominal_same_gap", "heavy_same_gap")
@@ -59,7 +59,7 @@ def _gaps(curves: Curves, sliders: Curves) -> list[Claim]:
     return [_beside(*parts) for parts in both]
 
 
-def _drop(curves: Curves, slider: Curve) -> list[Claim]:
+def _drop(curves: Curves, slider: DampedCurve) -> list[Claim]:
     block = curves["gap"][1]
     return [
         _beside(
@@ -162,12 +162,12 @@ def _masses(curves: Curves, sliders: Curves, bar: Bar, mass: float) -> list[Clai
     return [_beside(*parts) for parts in both]
 
 
-def highest_means(curves: Sequence[Curve], shape: Sequence[int]) -> np.ndarray:
+def highest_means(curves: Sequence[DampedCurve], shape: Sequence[int]) -> np.ndarray:
     """Return the tops of curves in the order of their axes, of this shape."""
     return np.reshape([curve.peak().height for curve in curves], shape)
 
 
-def fit(curves: Curves, play: np.ndarray, friction: np.ndarray, slider: Curve) -> list[Claim]:
+def fit(curves: Curves, play: np.ndarray, friction: np.ndarray, slider: DampedCurve) -> list[Claim]:
     """Judge fit and friction, horizontally and vertically; play: in m."""
     tops = highest_means(curves["map"], (2, len(play), len(friction)))
     _, row, column = np.unravel_index(np.argmin(tops), tops.shape)

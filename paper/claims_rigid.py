@@ -13,7 +13,7 @@ import numpy as np
 
 from paper.figure_scenes import Bar
 from vanedamp.studies.demo.claims import Curves, claim, verdict
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.report.claims import Claim
 
 #: mean amplitude above which a row near its peak moves together like one body: between its two steady states
@@ -151,7 +151,7 @@ def attached_closed_form(amplitude: np.ndarray, half_gap: float, restitution: fl
 MOST_THETA = 1 / (1 - 4 / np.pi**2)
 
 
-def regime(curve: Curve, half_gap: float, restitution: float) -> tuple[np.ndarray, np.ndarray]:
+def regime(curve: DampedCurve, half_gap: float, restitution: float) -> tuple[np.ndarray, np.ndarray]:
     """Return which points (n,) are in the symmetric 1:1 regime, and its attached mass fraction there."""
     theta, attached = attached_closed_form(curve.mean, half_gap, restitution)
     return curve.periodic & (np.abs(curve.impacts - 2) < 1e-9) & (theta < MOST_THETA), attached

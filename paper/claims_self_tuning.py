@@ -16,7 +16,7 @@ from paper.claims_rotation import Scenes, rigid, values
 from paper.claims_systems import means_of, top
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.studies.demo.claims import Curves, claim, verdict
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.report.claims import Claim
 
 #: amplitude below which a response counts as suppressed, of X
@@ -60,7 +60,7 @@ def _nominal(scene: Scene) -> int:
     return int(np.argmin(np.abs(gaps - scene.cavity[0].gap)))
 
 
-def _band(curve: Curve) -> float:
+def _band(curve: DampedCurve) -> float:
     """Return the highest of all means, with their confidence."""
     return float((curve.mean + curve.confidence).max())
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vanedamp.studies.demo.claims import Curves, claim, verdict
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.report.claims import Claim
 
 #: shares of the load at which friction carries the body along, of the file's normal loads
@@ -27,12 +27,12 @@ def claims(curves: Curves) -> list[Claim]:
     return [_friction_damper(curves, multi), _bodies(curves, multi), _particles(curves, multi), *_rotating(curves)]
 
 
-def top(curve: Curve) -> float:
+def top(curve: DampedCurve) -> float:
     """Return the top of the smoothed means where impacts scatter them, or else of the means."""
     return float((curve.smooth if curve.impacts.any() else curve.mean).max())
 
 
-def means_of(curves: Sequence[Curve]) -> np.ndarray:
+def means_of(curves: Sequence[DampedCurve]) -> np.ndarray:
     """Return the means (k, f) of k curves at all f frequencies that one of them has; nan where a run is not ok."""
     frequencies = np.unique(np.concatenate([curve.frequency for curve in curves]))
     means = np.full((len(curves), len(frequencies)), np.nan)

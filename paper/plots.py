@@ -14,13 +14,13 @@ from paper.claims_blocks import ROWS
 from paper.claims_rigid import MOST_THETA, attached_closed_form, regime
 from paper.claims_systems import FORCES, LOADS, NAMES, top
 from vanedamp.coupling.response.response import Response
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.demo.pictures import DARK, GREY, draw_damped, draw_linear, finish
 from vanedamp.studies.figures import draw_grid, save, subplots
 from vanedamp.studies.report.charts import COLOURS
 
 
-def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: Path) -> None:
+def panels_picture(panels: Mapping[str, Mapping[str, DampedCurve]], title: str, path: Path) -> None:
     """Draw forced responses in panels side by side, by their titles."""
     figure, row = subplots(1, len(panels), size=(5.6 * len(panels), 5.2), sharey=True)
     for axes, (name, curves) in zip(row, panels.items(), strict=True):
@@ -33,7 +33,7 @@ def panels_picture(panels: Mapping[str, Mapping[str, Curve]], title: str, path: 
 
 
 def orientations_picture(
-    curves: Mapping[str, Sequence[Curve]], angles: Sequence[float], title: str, path: Path
+    curves: Mapping[str, Sequence[DampedCurve]], angles: Sequence[float], title: str, path: Path
 ) -> None:
     """Draw horizontal and vertical responses, and the tops over the angle."""
     curves = {label: of for label, of in curves.items() if not label.endswith((" starts", " linked"))}
@@ -61,7 +61,10 @@ def orientations_picture(
 
 
 def blocks_picture(
-    blocks: Mapping[str, Sequence[Curve]], sliders: Mapping[str, Mapping[str, Sequence[Curve]]], title: str, path: Path
+    blocks: Mapping[str, Sequence[DampedCurve]],
+    sliders: Mapping[str, Mapping[str, Sequence[DampedCurve]]],
+    title: str,
+    path: Path,
 ) -> None:
     """Draw blocks beside sliders (dashed): the drop to the fixed curve, gaps, rows, bars."""
     figure, panels = subplots(2, 2, size=(14, 10.5))
@@ -86,7 +89,7 @@ def blocks_picture(
     save(figure, path, dpi=110)
 
 
-def _besides(axes: Axes, blocks: Mapping[str, Curve], sliders: Mapping[str, Curve]) -> None:
+def _besides(axes: Axes, blocks: Mapping[str, DampedCurve], sliders: Mapping[str, DampedCurve]) -> None:
     """Draw means of blocks and, dashed, smoothed means of sliders, by their names."""
     draw_linear(axes, next(iter(blocks.values())))
     for (name, block), colour in zip(blocks.items(), COLOURS, strict=False):
@@ -96,7 +99,7 @@ def _besides(axes: Axes, blocks: Mapping[str, Curve], sliders: Mapping[str, Curv
 
 
 def fit_picture(
-    tops: np.ndarray, play: np.ndarray, friction: np.ndarray, slider: Curve, title: str, path: Path
+    tops: np.ndarray, play: np.ndarray, friction: np.ndarray, slider: DampedCurve, title: str, path: Path
 ) -> None:
     """Draw maps of highest means (2, plays, frictions), horizontally and vertically; play in m."""
     figure, row = subplots(1, 2, size=(12, 4.8), sharey=True)
@@ -161,7 +164,7 @@ def history_picture(response: Response, reference: float, title: str, path: Path
 
 
 def mistuning_picture(
-    curves: Sequence[Curve], half_gaps: Sequence[float], restitution: float, title: str, path: Path
+    curves: Sequence[DampedCurve], half_gaps: Sequence[float], restitution: float, title: str, path: Path
 ) -> None:
     """Draw the attached mass fraction over the amplitude in half gaps, beside the closed form."""
     figure, axes = subplots(size=(9.5, 5.2))
@@ -193,7 +196,7 @@ def mistuning_picture(
     save(figure, path, dpi=110)
 
 
-def systems_picture(curves: Mapping[str, Sequence[Curve]], title: str, path: Path) -> None:
+def systems_picture(curves: Mapping[str, Sequence[DampedCurve]], title: str, path: Path) -> None:
     """Draw the best of each system, and its tops."""
     figure, (left, right) = subplots(1, 2, size=(14.5, 5.6), width_ratios=[1.5, 1])
     draw_linear(left, curves["single_body"][0])

@@ -12,7 +12,7 @@ from paper.blade import Blade, southwell
 from paper.claims_rotation import Scenes, friction_only, load_ratio, values
 from paper.claims_systems import top
 from vanedamp.studies.demo.claims import Curves
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.figures import draw_grid, save, subplots
 from vanedamp.studies.report.charts import COLOURS
 
@@ -115,7 +115,7 @@ def self_tuning_picture(curves: Curves, scenes: Scenes, title: str, path: Path) 
     unit = scenes["tuned"].excitation.resonance_amplitude
     gaps = values(scenes["tuned"], "cavity.c1.gap") / unit
     _linear(along, curves["held"][0])
-    shown: Mapping[str, Curve] = {
+    shown: Mapping[str, DampedCurve] = {
         f"track, gap {gap:g} X": curve for gap, curve in zip(gaps, curves["tuned"], strict=True) if gap <= 2
     } | {
         f"flat floor without friction, gap {gaps[1]:g} X": curves["flat"][1],
@@ -160,12 +160,12 @@ def self_tuning_picture(curves: Curves, scenes: Scenes, title: str, path: Path) 
     save(figure, path, dpi=110)
 
 
-def _linear(axes: Axes, curve: Curve) -> None:
+def _linear(axes: Axes, curve: DampedCurve) -> None:
     axes.plot(curve.frequency, 100 * curve.undamped, ":", color=_DARK, linewidth=1.4, label="without bodies")
     axes.plot(curve.frequency, 100 * curve.fixed, "--", color=_GREY, linewidth=1.4, label="body fixed")
 
 
-def _line(axes: Axes, curve: Curve, label: str, colour: str) -> None:
+def _line(axes: Axes, curve: DampedCurve, label: str, colour: str) -> None:
     """Draw means as points with their confidence and the curve through them, smoothed where impacts scatter them."""
     low, high = curve.mean - curve.confidence, curve.mean + curve.confidence
     axes.fill_between(curve.frequency, 100 * low, 100 * high, color=colour, alpha=0.25, linewidth=0)

@@ -29,15 +29,17 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError, nearest, read_toml, validate
 from vanedamp.studies.demo import demo
-from vanedamp.studies.demo.curve import Curve, curves
+from vanedamp.studies.demo.curve import DampedCurve, curves
 from vanedamp.studies.demo.figure_file import FigureScenes
 from vanedamp.studies.demo.figure_study import FigureStudy, Read, Session, print_claims, write_scene, written
 from vanedamp.studies.demo.figure_study import study as figure_study
 from vanedamp.studies.jobs.workers import workers
-from vanedamp.studies.report.claims import Claim, Study
+from vanedamp.studies.report.claims import Claim, ClaimStudy
 
 
-def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None, resume: bool = False) -> list[Study]:
+def run_paper(
+    folder: Path, names: Sequence[str] = (), count: int | None = None, resume: bool = False
+) -> list[ClaimStudy]:
     """Compute the named studies (default: all) into a folder, and print their claims. Raises InputError."""
     for name in names:
         if name not in STUDIES:
@@ -59,20 +61,20 @@ def run_paper(folder: Path, names: Sequence[str] = (), count: int | None = None,
     return studies
 
 
-def study(name: str, session: Session) -> Study:
+def study(name: str, session: Session) -> ClaimStudy:
     """Run one study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
     return STUDIES[name](session)
 
 
 def _figure(
     name: str, claims: Callable[[Read], list[Claim]], picture: Callable[[Read, Path], None] | None = None
-) -> Callable[[Session], Study]:
+) -> Callable[[Session], ClaimStudy]:
     """Return what runs the study of a file in scenes/."""
     made = FigureStudy(FOLDER / f"{name}.toml", claims)
     return partial(figure_study, made if picture is None else made._replace(picture=picture))
 
 
-def others(read: Read) -> dict[str, dict[str, list[Curve]]]:
+def others(read: Read) -> dict[str, dict[str, list[DampedCurve]]]:
     """Return the curves of other figures that a figure is compared with, by figure and curve."""
     session, found = read.session, {}
     for name, wanted in claims_blocks.SLIDERS[read.figure.name].items():
@@ -119,7 +121,7 @@ def _draw_fit(read: Read, path: Path) -> None:
     plots.fit_picture(tops, play, friction, others(read)["fig9"][""][1], read.figure.title, path)
 
 
-def _history(session: Session) -> Study:
+def _history(session: Session) -> ClaimStudy:
     """Run Fig. 13: the scene at the damped peak of Fig. 12, with samples and events."""
     data = read_toml(FOLDER / "fig13.toml")
     figure = session.figure(scene_file("fig12"))
@@ -136,19 +138,19 @@ def _history(session: Session) -> Study:
     title = f"{data['title']}, {response.frequency:.1f} Hz"
     plots.history_picture(response, session.structure.amplitude, title, folder / "fig13.png")
     claims = claims_history.fig13(response, runs["rigid"][1], alike)
-    return written(Study("fig13", title, ["fig13_response.h5"], claims), folder)
+    return written(ClaimStudy("fig13", title, ["fig13_response.h5"], claims), folder)
 
 
-def _blade(session: Session) -> Study:
+def _blade(session: Session) -> ClaimStudy:
     """Run `campbell`: no sweep of scenes, but finite elements over the speed."""
     found = blade.blade()
     plots_rotation.campbell_picture(found, blade.TITLE, session.folder / "campbell.png")
     sources = blade.save(found, session.folder)
-    return written(Study("campbell", blade.TITLE, sources, claims_rotation.campbell(found)), session.folder)
+    return written(ClaimStudy("campbell", blade.TITLE, sources, claims_rotation.campbell(found)), session.folder)
 
 
 #: the studies in their order: each runs in a session
-STUDIES: dict[str, Callable[[Session], Study]] = {
+STUDIES: dict[str, Callable[[Session], ClaimStudy]] = {
     **{name: partial(figure_study, demo.FIGURES[name]) for name in ("fig9", "fig10", "fig12")},
     "fig13": _history,
     "fig14": _figure("fig14", lambda read: claims_rigid.fig14(read.curves), _draw_orientations),

@@ -13,7 +13,7 @@ from vanedamp.files.store import StoreError, load
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.demo.figure_file import FigureScenes, Structure
+from vanedamp.studies.demo.figure_file import FigureScenes, FigureStructure
 from vanedamp.studies.demo.figure_study import CASE, MODES, Session, prepare, provenance
 
 
@@ -41,13 +41,13 @@ class PaperSession(Session):
         return old
 
 
-def prepared(folder: Path, resume: bool) -> Structure:
+def prepared(folder: Path, resume: bool) -> FigureStructure:
     """Make the shipped cluster's modes.h5 and rom.h5 in a folder; resume: unless those of this case are there."""
     case, mesh, modes, reduced = (folder / name for name in ("case.toml", "vane_cluster.msh", "modes.h5", "rom.h5"))
     same = case.is_file() and case.read_text(encoding="utf-8") == CASE
     same = same and mesh.is_file() and mesh.read_bytes() == SHIPPED.read_bytes()
     if resume and same and _made_by_us(modes, reduced):
-        return Structure.load(modes, reduced)
+        return FigureStructure.load(modes, reduced)
     return prepare(folder)
 
 

@@ -1,4 +1,4 @@
-"""A band of excitation frequencies, or of speeds along an engine order, over which a study judges its scene."""
+"""A band of excitation frequencies, or of speeds along an engine order, over which a study evaluates its scene."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Values = Range | Annotated[tuple[Positive, ...], Field(min_length=1)]
 
 @dataclass(frozen=True, config=STRICT)
 class Band:
-    """Frequencies, or speeds along an engine order. TABLE: the table of the file that a derived record stands for."""
+    """Frequencies, or speeds along an engine order. TABLE: name of the table that a derived record describes."""
 
     TABLE: ClassVar[str] = ""
     band: Values | None = None
@@ -58,8 +58,8 @@ class Band:
     @property
     def count(self) -> int:
         """Number of points of the band."""
-        given = getattr(self, self.key)
-        return given.num if isinstance(given, Range) else len(given)
+        points = getattr(self, self.key)
+        return points.num if isinstance(points, Range) else len(points)
 
     @property
     def values(self) -> np.ndarray:
@@ -86,15 +86,15 @@ class Band:
 
 
 def file_in(record: type[File], tables: Mapping[str, Any], table: str, missing: str, path: str | Path) -> File:
-    """Return the file of a study in its tables, of a TOML file that lies at `path`, which errors name.
+    """Return the record of a study file from its tables; errors name the file's `path`.
 
-    missing: what to do without its own table. Raises InputError.
+    missing: advice in the error if the study's own table is missing. Raises InputError.
     """
     data = dict(tables)
     if table not in data:
         raise InputError(f"{path}: {table}: missing; {missing}")
-    given = data[table]
-    if isinstance(given, dict) and not set(UNITS) & set(given):
+    entries = data[table]
+    if isinstance(entries, dict) and not set(UNITS) & set(entries):
         raise InputError(
             f"{path}: {table}.band: missing; give frequencies (Hz), or for an engine order speeds (rad/s) or rpm"
         )
@@ -126,18 +126,18 @@ def reference_amplitude(scene: Scene, band: np.ndarray, over_band: Literal["wors
 
 
 def at_frequency(scene: Scene, frequency: float) -> Scene:
-    """Return the scene at a frequency, Hz, of its engine order; one without an engine order as it is."""
+    """Return the scene at a frequency of its engine order, Hz; a scene without an engine order remains unchanged."""
     order = scene.excitation.engine_order
     return scene if order is None else replace(scene, rotation=Rotation(speed=speed_of(order, frequency)))
 
 
 def drive(scene: Scene, frequency: float) -> dict[str, Any]:
-    """Return what changes in a scene, at some speed with an engine order, for another frequency, Hz."""
+    """Return the changes to a scene, by path, that set an excitation frequency, Hz, or the speed that gives it."""
     order = scene.excitation.engine_order
     return {"excitation.frequency": frequency} if order is None else {"rotation.speed": speed_of(order, frequency)}
 
 
 def ends(scene: Scene, band: np.ndarray) -> tuple[float, float]:
-    """Return the ends of a band of frequencies (f,), Hz, as `linear_peaks` takes them."""
+    """Return the ends of a band of frequencies (f,), Hz, as arguments of `linear_peaks`."""
     low, high, order = float(band[0]), float(band[-1]), scene.excitation.engine_order
     return (low, high) if order is None else (speed_of(order, low), speed_of(order, high))

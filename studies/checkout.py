@@ -1,4 +1,4 @@
-"""Commands of a checkout: the packages `benchmarks` and `paper` lie in it next to `vanedamp`, and are not installed."""
+"""Commands of a checkout: the packages `benchmarks` and `paper` are next to `vanedamp` there, and are not installed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ROOT = Path(__file__).parents[2]
 
 
 class CheckoutError(VanedampError):
-    """A command of a checkout where there is none, or whose results would lie in its source."""
+    """A checkout command is called without a checkout, or would write results into the source."""
 
 
 class CheckoutCommand(NamedTuple):
@@ -35,7 +35,7 @@ class CheckoutCommand(NamedTuple):
         self._module().add_arguments(parser)
 
     def run(self, arguments: Namespace) -> None:
-        """Run it. Raises CheckoutError for an output folder that is the package's."""
+        """Run it. Raises CheckoutError if the output folder is that of the package."""
         if Path(arguments.output).resolve() == (_ROOT / self.package).resolve():
             raise CheckoutError(f"--output {arguments.output}: holds the source of this command; name another folder")
         self._module().run(arguments)

@@ -30,7 +30,7 @@ _NO_MEMORY = -1
 
 
 class _Version(argparse.Action):
-    """Print the version, which takes a while to look up."""
+    """Print the version; looked up only here, since this takes time."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         from importlib.metadata import version
@@ -40,30 +40,30 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that rejects a wrong command line in one line, with the word that may have been meant."""
+    """A parser that reports a wrong command line in one line, with the closest valid word."""
 
     def error(self, message: str) -> NoReturn:
         from vanedamp.files.toml_input import nearest  # heavy, as is all that is not for --help
 
         if choice := re.search(r"(invalid choice: '?([^',\s]*)'?).*\(choose from (.*)\)", message):
-            known = re.findall(r"[^',\s]+", choice[3])
-            message = f"{message[: choice.end(1)]}; {nearest(choice[2], known)}"
+            choices = re.findall(r"[^',\s]+", choice[3])
+            message = f"{message[: choice.end(1)]}; {nearest(choice[2], choices)}"
         elif option := re.search(r"unrecognized arguments: (?:[^-]\S* )*(--?\w[\w-]*)", message):
-            known = [name for action in self._actions for name in action.option_strings]
-            message += f"; {nearest(option[1], known)}"
+            choices = [name for action in self._actions for name in action.option_strings]
+            message += f"; {nearest(option[1], choices)}"
         self.exit(BAD_INPUT, f"{self.prog}: {shortened(message)}; see {self.prog} --help\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line. Returns the exit status: 0; 2 for bad input, or for files, memory or packages that are not
-    to be had, with one line on standard error; 130 when interrupted, 143 when terminated.
+    """Run the command line. Returns the exit status: 0; 2 for bad input, or for unavailable files, memory or packages,
+    with one line on standard error; 130 when interrupted, 143 when terminated.
 
     argv: the words after the command's name; None: this process's, whose end is not interrupted any more.
     Under mpirun the first rank runs it, and the others help with the factorisations.
     """
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    if sys.stdout is None:  # a file that is opened would take its place, and what libraries print
+    if sys.stdout is None:  # the next opened file would take its descriptor and receive what libraries print
         return _refuse("standard output is closed; send it to a file, or to /dev/null")
     if "_ARGCOMPLETE" in os.environ:
         _complete()
@@ -89,7 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _complete() -> None:
-    """Answer a shell that completes the command line it has in COMP_LINE, and exit; return without argcomplete."""
+    """Complete the command line in COMP_LINE for a shell, and exit; return without argcomplete."""
     try:
         import argcomplete
     except ImportError:
@@ -104,7 +104,7 @@ def _complete() -> None:
 
 
 def _drop_unwritten() -> None:
-    """Drop output that cannot be written, such as to a full disk: the interpreter would try again as it ends, and
+    """Drop output that cannot be written, such as to a full disk: at exit, the interpreter would try again and
     change the exit status."""
     for stream in (sys.stdout, sys.stderr):
         try:
@@ -114,11 +114,11 @@ def _drop_unwritten() -> None:
 
 
 def _leave() -> None:
-    """Prepare the end of the process, without interrupts: one there would end it without a line."""
+    """Prepare the end of the process with interrupts blocked: one at this point would end it without a message."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    gc.freeze()  # collecting what the end of the process frees takes longer than all else after an interrupt
+    gc.freeze()  # garbage collection would take most of the time until exit after an interrupt
     exec("")  # CPython remembers an interrupt within the last exec, such as of a dataclass, and would end by the signal
 
 
@@ -164,12 +164,12 @@ def _run(words: Sequence[str]) -> int:
 
 
 def _lacking(error: Exception) -> str | None:
-    """Return what the memory has no room for; input that asks for too much has a line of its own."""
+    """Describe the allocation that failed; input that needs too much memory has its own error."""
     return None if isinstance(error, VanedampError) else out_of_memory(error)
 
 
 def _message(error: Exception, file: str | None) -> str | None:
-    """Describe the error of the input (in a file) or the machine's deficiency; None for a fault of the program."""
+    """Describe an error of the input (in a file) or a lack of resources; None for a bug in the program."""
     if (lacking := _lacking(error)) is not None:
         return (
             f"not enough memory ({lacking}): free some, raise its limit (ulimit -v), or make the mesh, the model or "
@@ -195,12 +195,12 @@ def _refuse(message: str) -> int:
 
 
 def _under_mpi() -> bool:
-    """Say whether a launcher of Open MPI, MPICH or Intel MPI started several ranks."""
+    """Return whether a launcher of Open MPI, MPICH or Intel MPI started several ranks."""
     return any(int(os.environ.get(name, 1)) > 1 for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE"))
 
 
 def _parsers(name: str | None) -> tuple[_Parser, _Parser]:
-    """Return the parser of the command line, with the arguments of the named command only, and that command's."""
+    """Return the parser of the command line, with arguments of the named command only, and that command's parser."""
     commands = COMMANDS.own()
     if name not in commands:  # --help, a command of another package, or none at all
         commands = COMMANDS.all()
@@ -209,12 +209,12 @@ def _parsers(name: str | None) -> tuple[_Parser, _Parser]:
         "forced responses with impacts."
     )  # fmt: skip
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
-    named, places = parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for other, command in commands.items():
+    named, subparsers = parser, parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for command_name, command in commands.items():
         summary = command.SUMMARY
-        place = places.add_parser(other, help=summary, description=summary[0].upper() + summary[1:] + ".")
-        if other == name:
-            command.add_arguments(place)
-            place.set_defaults(run=command.run)
-            named = place
+        child = subparsers.add_parser(command_name, help=summary, description=summary[0].upper() + summary[1:] + ".")
+        if command_name == name:
+            command.add_arguments(child)
+            child.set_defaults(run=command.run)
+            named = child
     return parser, named

@@ -1,4 +1,4 @@
-"""Facts of an input file or a result: values under keys for machines, with unit and meaning for people."""
+"""Facts of an input file or a result: values by keys of the JSON output, with unit and meaning for the printed one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MOST = 10
 
 
 class Fact(NamedTuple):
-    """A value under a key of the results for machines, with its unit and meaning."""
+    """A value under its key in the JSON results, with unit and meaning."""
 
     key: str
     value: Any
@@ -22,7 +22,7 @@ class Fact(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The content of a file, its texts of nested data as such."""
+    """The content of a file, with JSON texts decoded."""
 
     path: str
     variables: Mapping[str, Variable]
@@ -45,7 +45,7 @@ def plain_facts(record: Found) -> Iterator[Fact]:
 
 
 def fact_lines(head: str, found: Iterable[Fact]) -> Iterator[str]:
-    """Yield facts for people, below a line."""
+    """Yield printed lines of facts below a heading."""
     yield head
     for key, value, unit, text in found:
         if key == "warnings":
@@ -56,12 +56,12 @@ def fact_lines(head: str, found: Iterable[Fact]) -> Iterator[str]:
 
 
 def _known(value: Any) -> bool:
-    """Whether there is something to print of a value."""
+    """Whether a value is worth printing."""
     return any(map(_known, value)) if isinstance(value, list) else value not in ({}, None)
 
 
 def word(value: Any) -> str:
-    """Return a value as it stands in a line."""
+    """Return a value as printed text."""
     if isinstance(value, dict):
         return "; ".join(f"{key}: {word(entry)}" for key, entry in value.items())
     if isinstance(value, list):

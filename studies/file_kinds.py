@@ -1,4 +1,4 @@
-"""The kinds of input files by name, as `vanedamp schema`, `new` and `check` know them."""
+"""The kinds of input files by name, for `vanedamp schema`, `new` and `check`."""
 
 from __future__ import annotations
 
@@ -51,24 +51,24 @@ KINDS = {
 _WITH_SCENE = ("identification", "life", "study")
 #: stages of pipelines, lists there, whose names are tables in scenes and studies
 _STAGES = ("sweep", "ramp", "optimise", "life")
-#: what commands take besides: HDF5, and TOML of every kind
+#: further inputs of commands: HDF5 results, and TOML of every kind
 RESULT, ANY = "result", "input"
 _MESH = "a mesh, which a case names in [mesh] file"
-#: files of no kind, by their endings
+#: other files, by their endings
 _OTHERS = {".json": "JSON, for other programs", ".csv": "a table", ".html": "a page"} | dict.fromkeys(
     (".msh", ".inp", ".bdf", ".nas", ".unv"), _MESH
 )
 
 
 def kind_of(tables: Mapping[str, Any], source: str) -> FileKind:
-    """Return the kind of a file, which its tables tell. Raises InputError for a file of no kind."""
+    """Return the kind of a file by its tables. Raises InputError for an unknown kind."""
     if any(isinstance(tables.get(name), list) for name in _STAGES):
         return KINDS["pipeline"]
     for kind in KINDS.values():
         if not set(kind.tables).isdisjoint(tables):
             return kind
-    known = "; ".join(f"{a(kind)} has {', '.join(kind.tables)}" for kind in reversed(KINDS.values()))
-    raise InputError(f"{source}: no kind of input file has these keys; {known}")
+    choices = "; ".join(f"{a(kind)} has {', '.join(kind.tables)}" for kind in reversed(KINDS.values()))
+    raise InputError(f"{source}: no kind of input file has these keys; {choices}")
 
 
 def a(kind: FileKind) -> str:
@@ -77,7 +77,7 @@ def a(kind: FileKind) -> str:
 
 
 def another_kind(path: str | Path, taken: Collection[str]) -> str:
-    """Return what a file is, and which command takes it, in words; "" if it is, or may be, of a kind that is taken.
+    """Describe a file and the command that takes it; "" if it is, or may be, of an accepted kind.
 
     taken: names of KINDS, RESULT, ANY.
     """
@@ -93,16 +93,16 @@ def another_kind(path: str | Path, taken: Collection[str]) -> str:
         tables = read_toml(file)
         kind = kind_of(tables, str(path))
     except VanedampError:
-        known = file.suffix in _OTHERS and not file.name.endswith(".claims.json")
-        return f"is {_OTHERS[file.suffix]}" if known else ""
-    own = {table for name in taken if name in KINDS for table in KINDS[name].tables}
-    if ANY in taken or kind.name in taken or (not own.isdisjoint(tables) and kind.name not in _WITH_SCENE):
+        named = file.suffix in _OTHERS and not file.name.endswith(".claims.json")
+        return f"is {_OTHERS[file.suffix]}" if named else ""
+    accepted = {table for name in taken if name in KINDS for table in KINDS[name].tables}
+    if ANY in taken or kind.name in taken or (not accepted.isdisjoint(tables) and kind.name not in _WITH_SCENE):
         return ""
     shown = next((table for table in kind.tables if table in tables), "[sweep]")  # as a list
     return f"is {a(kind)} ([{shown}]): vanedamp {kind.command or kind.name} {path}"
 
 
 def expected(taken: Collection[str]) -> str:
-    """Return the kinds that are taken, in words."""
-    others = {RESULT: "a result (HDF5)", ANY: "an input file (TOML)"}
-    return " or ".join(others.get(name) or f"{a(KINDS[name])} ([{KINDS[name].tables[0]}])" for name in taken)
+    """Return the accepted kinds in words."""
+    general = {RESULT: "a result (HDF5)", ANY: "an input file (TOML)"}
+    return " or ".join(general.get(name) or f"{a(KINDS[name])} ([{KINDS[name].tables[0]}])" for name in taken)

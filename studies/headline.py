@@ -1,7 +1,7 @@
 """The key results of a damped curve: its peak over that of the curve without bodies, in the same range.
 
-The linear curves are known between the points of a sweep, the damped one at its points only; so the headline says how
-many of these are left out, whether the peak lies at an edge of the range, and whether the points are too coarse.
+Linear curves are known between the points of a sweep, the damped one only at the points. So the headline reports how
+many points are left out, whether the peak lies at an edge of the range, and whether the points are too coarse.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy as np
 
 from vanedamp.files.toml_input import plain
 
-#: fraction of the numbers around it below which a result is round-off
+#: results below this fraction of their scale are round-off
 _ROUND_OFF = 1e-12
 
 
 class _Top(NamedTuple):
-    """Highest value of a curve, m, its place on the axis, and whether that is an edge of a range of frequencies."""
+    """Maximum of a curve, m, its position on the axis, and whether this is an edge of a range of frequencies."""
 
     height: float
     at: Any
@@ -29,14 +29,14 @@ class _Top(NamedTuple):
 
 @dataclass(frozen=True)
 class Headline:
-    """The results of a damped curve; nan or None where there is none.
+    """The results of a damped curve; nan or None for missing ones.
 
     damped_peak, damped_maximum  m, highest mean of the periods' peaks, and highest absolute maximum
     damped_peak_at               its place on the axis
     undamped_peak, fixed_peak    m, highest amplitudes without bodies and with all fixed, over the same range
     attached_mass_fraction       at the damped peak
-    onset                        first place with impacts on walls (of sliders in one cavity, or between them)
-    touched_below                first place below it where a body hits its floor or ceiling only, or another body
+    onset                        first position with impacts on walls (of sliders in one cavity, or between them)
+    touched_below                first position below it where a body hits only its floor or ceiling, or another body
     peak_at_edge, undamped_at_edge, fixed_at_edge   whether a peak lies at an edge of the frequencies: no resonance's
     spacing, half_power_width    Hz, or units of a speed along an engine order: widest step next to the peaks that are
                                  resonances, and width of the undamped one
@@ -72,12 +72,12 @@ class Headline:
 
     @property
     def maximum_ratio(self) -> float:
-        """The largest damped amplitude over the undamped peak: what high-cycle fatigue counts."""
+        """The largest damped amplitude over the undamped peak, which governs high-cycle fatigue."""
         return self.relative(self.damped_maximum)
 
     @property
     def too_coarse(self) -> bool:
-        """Say whether a step next to a resonance is wider than the resonance: a peak may hide there."""
+        """Whether a step next to a resonance is wider than the resonance, so that a peak may be missed."""
         return self.spacing > self.half_power_width > 0.0
 
     @property
@@ -167,26 +167,26 @@ def headline(
     """
     ok = np.isfinite(damped_mean)
     free = _linear_top("undamped", x, undamped, peaks, along_frequency)
-    held = _linear_top("fixed", x, fixed, peaks, along_frequency)
+    fixed_top = _linear_top("fixed", x, fixed, peaks, along_frequency)
     top = _top(x[ok], damped_mean[ok], along_frequency)
     onset = int(np.argmax(np.append(walls > 0.0, True)))
     below = np.flatnonzero(impacts[:onset] > 0.0)
-    resonances = [item.at for item in (free, held, top) if along_frequency and ok.any() and not item.at_edge]
+    resonances = [item.at for item in (free, fixed_top, top) if along_frequency and ok.any() and not item.at_edge]
     return Headline(
         damped_peak=top.height,
         damped_peak_at=top.at,
         damped_maximum=_top(x[ok], damped_max[ok], along_frequency).height,
         undamped_peak=free.height,
         undamped_peak_at=free.at,
-        fixed_peak=held.height,
-        fixed_peak_at=held.at,
+        fixed_peak=fixed_top.height,
+        fixed_peak_at=fixed_top.at,
         attached_mass_fraction=float(attached[ok][np.argmax(damped_mean[ok])]) if ok.any() else math.nan,
         onset=plain(x[onset]) if onset < len(x) else None,
         touched_below=plain(x[below[0]]) if below.size else None,
         peak_at_edge=top.at_edge,
         undamped_at_edge=free.at_edge,
-        fixed_at_edge=held.at_edge,
-        spacing=max((_step(x[ok], place) for place in resonances), default=math.nan),
+        fixed_at_edge=fixed_top.at_edge,
+        spacing=max((_step(x[ok], at) for at in resonances), default=math.nan),
         half_power_width=float(peaks.get("half_power_width", math.nan)),
         points=len(x),
         points_left_out=int(np.count_nonzero(~ok)),
@@ -195,8 +195,8 @@ def headline(
 
 def reference_of(undamped: np.ndarray, peaks: Mapping[str, float]) -> float:
     """Return the divisor of amplitudes in charts, m: the undamped maximum, at the points if the peak is unbounded."""
-    known = float(peaks.get("undamped_peak", math.nan))
-    return known if 0.0 < known < math.inf else float(np.nan_to_num(undamped).max(initial=0.0)) or math.nan
+    peak = float(peaks.get("undamped_peak", math.nan))
+    return peak if 0.0 < peak < math.inf else float(np.nan_to_num(undamped).max(initial=0.0)) or math.nan
 
 
 def _linear_top(name: str, x: np.ndarray, curve: np.ndarray, peaks: Mapping[str, float], along_frequency: bool) -> _Top:
@@ -210,15 +210,15 @@ def _linear_top(name: str, x: np.ndarray, curve: np.ndarray, peaks: Mapping[str,
 def _top(x: np.ndarray, curve: np.ndarray, along_frequency: bool) -> _Top:
     if not len(x):
         return _Top(math.nan, None, False)
-    place = int(np.argmax(curve))
-    return _Top(float(curve[place]), plain(x[place]), along_frequency and place in (0, len(x) - 1))
+    index = int(np.argmax(curve))
+    return _Top(float(curve[index]), plain(x[index]), along_frequency and index in (0, len(x) - 1))
 
 
-def _step(x: np.ndarray, place: float) -> float:
-    """Return the widest step of ascending points (n,) that a place lies in; beyond them, its distance."""
-    if not x[0] <= place <= x[-1]:
-        return float(np.abs(x - place).min())
-    left, right = np.searchsorted(x, place, "left"), np.searchsorted(x, place, "right")
+def _step(x: np.ndarray, at: float) -> float:
+    """Return the widest step of ascending points (n,) that contains a position; outside their range, its distance."""
+    if not x[0] <= at <= x[-1]:
+        return float(np.abs(x - at).min())
+    left, right = np.searchsorted(x, at, "left"), np.searchsorted(x, at, "right")
     return float(np.diff(x[max(left - 1, 0) : right + 1]).max(initial=0.0))
 
 

@@ -1,4 +1,4 @@
-"""Hot spots of a reduced model in words."""
+"""Printed lines on hot spots of a reduced model."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from vanedamp.modal.algebra import MOVES, von_mises
 from vanedamp.rom.recovery import SHOWN, shown_modes
 
-#: unit of the stress of a cause, and how many of them a Pa is
+#: unit of the stress of a cause, and factor from Pa to this unit
 _UNITS = {"rotation": ("Pa s^2/rad^2", 1.0)}
 _MPA = ("MPa", 1e-6)
 #: estimated relative error of a stress above which commands warn
 DOUBTFUL = 0.3
-#: what warnings call the amplitude at the fatigue strength
+#: name of the amplitude at the fatigue strength in warnings
 _LEVEL = "the amplitude at the fatigue strength"
 
 
@@ -26,23 +26,23 @@ def spot_lines(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
         if "coordinates" in facts:
             line += _place(facts["coordinates"])
         line += f" in {facts['group']}" if facts.get("group") else ""
-        parts = []
+        texts = []
         mode, first = facts.get("mode", {}), facts.get("per_amplitude")
         if mode.get("number", 1) != 1:
-            told = f"mode {mode['number']} ({mode['frequency_hz']:.6g} Hz)"
-            parts.append(_of_amplitude(told, mode) if "at" in mode else f"{told}, which moves no interface coordinate")
+            word = f"mode {mode['number']} ({mode['frequency_hz']:.6g} Hz)"
+            texts.append(_of_amplitude(word, mode) if "at" in mode else f"{word}, which moves no interface coordinate")
         if first:
-            parts.append(_of_amplitude("first mode", first))
+            texts.append(_of_amplitude("first mode", first))
         for cause, values in facts.get("static", {}).items():
             unit, factor = _UNITS.get(cause, _MPA)
             stress, doubt = von_mises(np.array(values)), facts.get("static_error", {}).get(cause)
             error = plus_minus(doubt / stress if doubt is not None and stress else None)
-            parts.append(f"{cause} {stress * factor:.4g} {unit}{error}")
-        yield line + (": von Mises stress of " + ", ".join(parts) if parts else "")
+            texts.append(f"{cause} {stress * factor:.4g} {unit}{error}")
+        yield line + (": von Mises stress of " + ", ".join(texts) if texts else "")
 
 
 def spot_warnings(provenance: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what to look at in the stresses of a reduced model, by its provenance."""
+    """Yield warnings on the stresses of a reduced model, from its provenance."""
     level = provenance.get("fatigue")
     spots = {name: facts for name, facts in provenance.get("hot_spots", {}).items() if isinstance(facts, Mapping)}
     yield from _doubts(({} if level is None else {_LEVEL: level}) | spots)
@@ -61,19 +61,19 @@ def spot_warnings(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 
 def level_warnings(level: Mapping[str, Any] | None) -> Iterator[str]:
-    """Yield what to look at in the amplitude at the fatigue strength (studies.case.stages.Fatigue), if there is one."""
+    """Yield warnings on the amplitude at the fatigue strength (studies.case.stages.FatigueLevel); none without one."""
     if level is not None:
         yield from _doubts({_LEVEL: level})
         yield from _unmoved(level)
 
 
 def plus_minus(error: float | None) -> str:
-    """Return an estimated relative error in words, after the number that it is of; nothing where it is not known."""
+    """Return the text of an estimated relative error, to follow its number; empty if there is no estimate."""
     return "" if error is None else f" (+- {100.0 * error:.2g} % by the mesh)"
 
 
 def _doubts(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    """Yield a warning of stresses that no mesh determines, and of those that this mesh does not."""
+    """Yield warnings of singular stresses, and of stresses that this mesh does not resolve."""
     singular = [f"{name} beside {facts['singular']}" for name, facts in spots.items() if facts.get("singular")]
     if singular:
         yield (
@@ -90,7 +90,7 @@ def _doubts(spots: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
 
 
 def _unmoved(level: Mapping[str, Any] | None) -> Iterator[str]:
-    """Yield a warning of a coordinate that its mode hardly moves, so that the mesh decides by how much."""
+    """Yield a warning of a coordinate that its mode hardly moves, so that the value depends on the mesh."""
     if level is not None and (moved := level.get("moved", 1.0)) < MOVES:
         yield (
             f"{_LEVEL}: its coordinate moves by {moved:.1g} of the structure's largest displacement, which the mesh "
@@ -107,11 +107,11 @@ def _of_amplitude(mode: str, of: Mapping[str, Any]) -> str:
 
 
 def strength_lines(strengths: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    """Yield a line for each hot spot with the strength of a motion that happens now and then (strength.assessment)."""
-    for name, found in strengths.items():
-        line = f"{name}: {found['amplitude'] / 1e6:.4g} MPa, utilisation {found['utilisation']:.3g}"
+    """Yield a line for each hot spot with the strength of a motion that occurs occasionally (strength.assessment)."""
+    for name, strength in strengths.items():
+        line = f"{name}: {strength['amplitude'] / 1e6:.4g} MPa, utilisation {strength['utilisation']:.3g}"
         for kind, of in (("life_starts", "starts"), ("life_repeats", "times")):
-            if kind in found:
-                line += f", damage {found['damage']:.3g}: median life {found[kind]['50%']:.3g} {of}"
+            if kind in strength:
+                line += f", damage {strength['damage']:.3g}: median life {strength[kind]['50%']:.3g} {of}"
                 break
         yield line

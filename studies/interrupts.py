@@ -1,4 +1,4 @@
-"""Ctrl-C in callbacks: it is never lost; and a request to terminate, which ends a command as Ctrl-C does."""
+"""Ctrl-C is not lost in callbacks; a request to terminate ends a command like Ctrl-C."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-# s, in which the callback that swallowed an interrupt has ended
+# s, after which the callback that swallowed an interrupt has ended
 _SOON = 0.02
 
 

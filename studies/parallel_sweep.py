@@ -1,4 +1,4 @@
-"""`vanedamp.sweep` and `vanedamp.ensemble`: as programs and notebooks run them, processes and progress by arguments."""
+"""`vanedamp.sweep` and `vanedamp.ensemble` for programs and notebooks, with arguments for processes and progress."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def sweep(
     progress: True shows a bar, a function is called with the number of points done and their total; checkpoint: a file
     that keeps finished points, from which a sweep that was killed resumes; provenance: data that the result keeps
     (JSON-able).
-    Every point is checked before the first run: raises InputError for one that is no scene. A run that breaks, or
-    takes its worker with it, is a point with the status "error: ...". Raises StoreError when the checkpoint cannot be
-    written, SweepError when the workers are lost for good.
+    Every point is checked before the first run: raises InputError for an invalid one. A run that fails, or
+    ends its worker, gives a point with the status "error: ...". Raises StoreError if the checkpoint cannot be
+    written, SweepError if the workers are lost for good.
     """
     return _run(run_sweep, "sweep", scene, executor, progress, checkpoint, provenance, workers)
 

@@ -1,4 +1,4 @@
-"""The mesh of a whole ring: that of one sector turned N times, with the nodes of the joints once."""
+"""The mesh of a whole ring: that of one sector rotated N times, with the nodes of the joints merged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from vanedamp.modal.algebra import rotation, turns
 from vanedamp.modal.records.ring_modes import RingModes
 
-#: distance up to which nodes of two sectors are one, over the sector's size
+#: distance relative to the sector's size up to which nodes of two sectors are merged
 _SAME = 1e-4
 
 
@@ -29,13 +29,13 @@ class WholeRing(NamedTuple):
     cells: np.ndarray
 
     def shape(self, modes: RingModes, mode: int) -> np.ndarray:
-        """Return the complex shape (n, 3) of a mode: the wave is Re(shape exp(i phase)); real where it stands."""
+        """Return the complex shape (n, 3) of a mode: the wave is Re(shape exp(i phase)); real for a standing wave."""
         real, imaginary = (modes.whole(mode, phase)[self.sector, self.node] for phase in (0.0, -np.pi / 2.0))
         return real if 2 * abs(modes.diameters[mode]) in (0, modes.sectors) else real + 1j * imaginary
 
 
 def joints(modes: RingModes, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes (k,) of a sector's low face and, in the same order, those of its high face, which they meet."""
+    """Return the nodes (k,) of a sector's low face and, in the same order, the matching nodes of its high face."""
     turn = rotation(modes.axis, modes.angle)
     away, nearest = cKDTree(coordinates).query((coordinates - modes.point) @ turn.T + modes.point)
     low = np.flatnonzero(away <= _SAME * np.linalg.norm(np.ptp(coordinates, axis=0)))
@@ -51,10 +51,10 @@ def whole_ring(modes: RingModes, coordinates: np.ndarray, cells: np.ndarray) -> 
     numbers[:, high] = np.roll(numbers[:, low], -1, axis=0)
     on_axis = low[low == high]
     numbers[:, on_axis] = on_axis
-    kept, places = np.unique(numbers, return_inverse=True)
-    sector, node = np.divmod(kept, count)
+    unique, inverse = np.unique(numbers, return_inverse=True)
+    sector, node = np.divmod(unique, count)
     points = np.einsum("sij,nj->sni", turns(modes.axis, sectors), coordinates - modes.point)[sector, node] + modes.point
-    return WholeRing(sector, node, points, places.reshape(sectors, count)[:, cells].reshape(-1, cells.shape[1]))
+    return WholeRing(sector, node, points, inverse.reshape(sectors, count)[:, cells].reshape(-1, cells.shape[1]))
 
 
 def with_parts(shapes: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:

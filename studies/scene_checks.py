@@ -10,7 +10,7 @@ from vanedamp.files.toml_input import InputError
 
 
 def load_scene(path: str | Path, ranges: bool = False) -> Scene:
-    """Load a scene whose reduced model is there; ranges: whether its numbers may be ranges. Raises InputError."""
+    """Load a scene whose reduced model exists; ranges: whether its numbers may be ranges. Raises InputError."""
     scene = Scene.load(path)
     if not ranges:
         check_numbers(scene, f"{path}: ")
@@ -27,7 +27,7 @@ def check_numbers(scene: Scene, source: str = "") -> None:
 
 
 def check_moved(scene: Scene) -> None:
-    """Raise InputError for a scene in which nothing moves the structure."""
+    """Raise InputError for a scene without excitation."""
     if not scene.moved:
         raise InputError(
             "excitation: nothing moves the structure; give force, base_acceleration, resonance_amplitude or load, or "
@@ -36,6 +36,6 @@ def check_moved(scene: Scene) -> None:
 
 
 def check_model(scene: Scene) -> None:
-    """Raise InputError for a scene whose reduced model is not there."""
+    """Raise InputError for a scene whose reduced model does not exist."""
     if isinstance(scene.structure, Rom) and not Path(scene.structure.file).is_file():
         raise InputError(f"structure.file: no such file {scene.structure.file}; `vanedamp reduce` writes one")

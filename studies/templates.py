@@ -1,4 +1,4 @@
-"""Files to start from: a scene, a case and a study that work as they are, with what their keys mean."""
+"""Template files: a scene, a case and a study that work unchanged, with comments on their keys."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
-from vanedamp.studies.demo.figure_file import Structure
+from vanedamp.studies.demo.figure_file import FigureStructure
 from vanedamp.studies.hot_spots import plus_minus
 
 #: mass of the body over the structure's, and its gap over the amplitude without bodies
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
 #: frequency of a body on its contact over the resonance's, at least and at most
 _STIFFNESS = (10.0, 30.0)
-#: over the natural frequency: a run that shows the body at work, and the ends of a sweep and of a study's band
+#: relative to the natural frequency: a run in which the body is active, and the ends of a sweep and of a study's band
 _RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
 
 _SCENE_NOTE = """\
@@ -87,8 +87,8 @@ def _notes(rom: Path | None) -> dict[str, str]:
     if rom is None:
         return {"structure": _STRUCTURE_NOTE}
     level = ReducedModel.load(rom).provenance.get("fatigue")
-    told = _NO_STRENGTH if level is None else _AT_STRENGTH.format(**level) + plus_minus(level.get("error"))
-    return {"excitation": _LEVEL_NOTE.format(level=told), "contact": _CONTACT_NOTE}
+    level_text = _NO_STRENGTH if level is None else _AT_STRENGTH.format(**level) + plus_minus(level.get("error"))
+    return {"excitation": _LEVEL_NOTE.format(level=level_text), "contact": _CONTACT_NOTE}
 
 
 def _case(file: Path) -> Template:
@@ -115,25 +115,25 @@ def _case(file: Path) -> Template:
 def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
     """Return a scene with gap and mass of a good damper, by the resonance of its structure.
 
-    blocks: bodies are blocks where a reduced model has the motion and the size of their cavity; they take longer.
+    blocks: use blocks where a reduced model has the motion and the size of their cavity; these runs take longer.
     """
-    shipped = Structure.shipped()
+    shipped = FigureStructure.shipped()
     amplitude = _rounded(shipped.amplitude, 2)
     if rom is None:
         structure = {
             "model": "rigid", "mass": _rounded(shipped.mass), "stiffness": _rounded(shipped.stiffness),
             "damping_ratio": shipped.damping_ratio,
         }  # fmt: skip
-        place: dict[str, Any] = {}
+        location: dict[str, Any] = {}
         cavities: list[dict[str, Any]] = [{"name": "c1"}]
         near = [shipped.frequency] * 2
     else:
         model = ReducedModel.load(rom)
-        structure, place, cavities, near = _on_model(model, rom)
+        structure, location, cavities, near = _on_model(model, rom)
         if (level := model.provenance.get("fatigue")) is not None:
-            place["at"], near = level["at"], [level["frequency_hz"]] * 2
+            location["at"], near = level["at"], [level["frequency_hz"]] * 2
             amplitude = _rounded(level["amplitude"], 2)
-    excitation = place | {"frequency": near[0], "resonance_amplitude": amplitude}
+    excitation = location | {"frequency": near[0], "resonance_amplitude": amplitude}
     moving: dict[str, Any] = {"structure": structure, "excitation": excitation | {"resonance_near": near}}
     moving["cavity"] = [cavity | {"gap": amplitude} for cavity in cavities]
     resonance = chosen_resonance(validate(Scene, moving, str(rom or file)))
@@ -196,10 +196,10 @@ def _on_model(
 
 
 def _contact_stiffness(model: ReducedModel, cavities: list[dict[str, Any]], resonance: Resonance, mass: float) -> float:
-    """Return the stiffness of a contact, N/m: that of the softest wall under a static force, without the resonance.
+    """Return the stiffness of a contact, N/m: the static stiffness of the softest wall, without the resonance.
 
     Body and contact alone vibrate at _STIFFNESS times the resonance's frequency at least and at most: softer contacts
-    overlap by much of the gap, harder ones only take longer.
+    overlap by much of the gap, stiffer ones only increase the run time.
     """
     labels = {cavity.get(side, cavity["floor"]) for cavity in cavities for side in ("left", "right")}
     rows = [model.interface.index(label) for label in labels]
@@ -232,7 +232,7 @@ def _pocket(model: ReducedModel, label: str) -> tuple[float, float] | None:
 
 
 def _beside(file: Path, folder: Path) -> str:
-    """Return the name of a file as one in a folder says it."""
+    """Return the path of a file relative to a folder."""
     file, folder = file.resolve(), folder.resolve()
     return str(file.relative_to(folder) if file.is_relative_to(folder) else file)
 

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on a terminal, a line now and then in a log; and what a command is at meanwhile."""
+"""Progress of long work: a bar on a terminal, occasional lines in a log, and the present stage of a command."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
-#: seconds between two lines in a log, and those after which a log names a stage that has not ended
+#: seconds between two lines in a log, and seconds after which a log names an unfinished stage
 _PATIENCE, _SOON = 30.0, 2.0
 _UNITS = (("days", 86_400.0), ("h", 3600.0), ("min", 60.0))
-#: how stages are shown: by the progress under way, by lines of their own, or (None, outside of commands) not at all
+#: how stages are shown: by the running progress, by separate lines, or (None, outside commands) not at all
 _DISPLAY: ContextVar[_Lines | Bar | _Alone | None] = ContextVar("display", default=None)
 
 
@@ -21,8 +21,8 @@ _DISPLAY: ContextVar[_Lines | Bar | _Alone | None] = ContextVar("display", defau
 def progress(title: str) -> Iterator[Callable[[int, int], None]]:
     """Show progress on standard error, with rate and time left: a bar on a terminal, elsewhere a line every 30 s.
 
-    The clock starts with the first call: what was done before, or compiled, says nothing of the rate. Stages before it
-    are named by themselves.
+    Timing starts with the first call, so that earlier work and compilation do not affect the rate. Stages before it
+    are shown separately.
     """
     show = Bar(title) if sys.stderr.isatty() else _Lines(title)
     before = _DISPLAY.set(show)
@@ -35,7 +35,7 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def stages_shown() -> Iterator[None]:
-    """Let stages show on standard error: in commands, not in functions that Python calls."""
+    """Show stages on standard error: in commands, not in functions called from Python."""
     before = _DISPLAY.set(_Alone())
     try:
         yield
@@ -45,7 +45,7 @@ def stages_shown() -> Iterator[None]:
 
 @contextmanager
 def stage(title: str) -> Iterator[None]:
-    """Name what a command is at: on a terminal at once, in a log if it takes longer than 2 s."""
+    """Show the present stage of a command: on a terminal at once, in a log if it takes longer than 2 s."""
     display = _DISPLAY.get()
     if display is None:
         yield
@@ -58,7 +58,7 @@ def stage(title: str) -> Iterator[None]:
 
 
 class _Alone:
-    """Stages of a command that counts nothing, or has not begun to: a line that is rewritten, or one line each."""
+    """Stages of a command without progress, or before it starts: a line that is rewritten, or one line per stage."""
 
     def __init__(self) -> None:
         self.title = ""
@@ -67,7 +67,7 @@ class _Alone:
 
     def enter(self, title: str) -> str:
         """Show another stage, or none (""). Returns the one before."""
-        with self.lock:  # a line that is due now comes before what follows the stage, or not at all
+        with self.lock:  # a line that is due is printed before the stage ends, or not at all
             before, self.title = self.title, title
         if self.timer is not None:
             self.timer.cancel()
@@ -123,11 +123,11 @@ class Bar:
 
 
 class _Lines:
-    """Lines in a log: how much is done, at which rate, and the time left. tqdm rewrites a single line."""
+    """Lines in a log: progress, rate, and the remaining time. tqdm would rewrite a single line."""
 
     def __init__(self, title: str) -> None:
         self.title, self.stage = title, ""
-        self.started = self.said = 0.0
+        self.started = self.printed_at = 0.0
         self.first: int | None = None
         self.before = _Alone()
 
@@ -135,14 +135,14 @@ class _Lines:
         now = time.monotonic()
         if self.first is None:
             self.before.enter("")
-            self.first, self.started, self.said = done, now, now
-        if now - self.said < _PATIENCE or done == total:
+            self.first, self.started, self.printed_at = done, now, now
+        if now - self.printed_at < _PATIENCE or done == total:
             return
-        self.said = now
+        self.printed_at = now
         rate = (done - self.first) / (now - self.started)
-        left = f", {rate:.3g} per second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
+        remaining = f", {rate:.3g} per second, {(total - done) / rate / 60:.3g} min left" if rate > 0.0 else ""
         stage = f", {self.stage}" if self.stage else ""
-        _print(f"{self.title}{stage}: {done} of {total}{left}")
+        _print(f"{self.title}{stage}: {done} of {total}{remaining}")
 
     def enter(self, title: str) -> str:
         """Name a stage in the lines that follow. Returns the one before."""

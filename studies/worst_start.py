@@ -1,4 +1,4 @@
-"""A chosen damper over its band from other starts: at rest, and from the last state of its neighbour, up and down."""
+"""A damper over its band from several starts: at rest, and from the last state of the neighbour, up and down."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import finite
 from vanedamp.studies.band import drive
 
-#: directions of a sweep, and how their runs begin, in words
+#: directions of a sweep, and their starts in words
 STARTS = {"independent": "at rest", "up": "going up", "down": "going down"}
 
 
@@ -35,25 +35,25 @@ def worst_start(
     for frequency in frequencies.tolist():
         for path, value in drive(scene, frequency).items():
             axes.setdefault(path, []).append(value)
-    found = sweep(scene.replace({"sweep": axes}), executor, progress)
-    ok, worst = found.status == "ok", points_of_designs(found)[0][0]
-    start, place = np.unravel_index(worst, found.shape)
+    runs = sweep(scene.replace({"sweep": axes}), executor, progress)
+    ok, worst = runs.status == "ok", points_of_designs(runs)[0][0]
+    start, index = np.unravel_index(worst, runs.shape)
     mean, largest = (
-        np.where(ok, relative_amplitudes(found, heights), np.nan)
-        for heights in (found.amplitude_mean_dynamic, found.amplitude_max_dynamic)
+        np.where(ok, relative_amplitudes(runs, heights), np.nan)
+        for heights in (runs.amplitude_mean_dynamic, runs.amplitude_max_dynamic)
     )
-    told: dict[str, Any] = finite(
+    facts: dict[str, Any] = finite(
         {
             "starts": len(ok), "direction": axes["continuation.direction"][start],
-            "frequency": float(frequencies[place]), "peak_ratio": float(mean.flat[worst]),
+            "frequency": float(frequencies[index]), "peak_ratio": float(mean.flat[worst]),
             "maximum_ratio": float(np.fmax.reduce(largest, axis=None)), "not_ok": int((~ok).sum()),
         }
     )  # fmt: skip
-    return told
+    return facts
 
 
 def worst_words(told: dict[str, Any]) -> str:
-    """Return the worst over starts for people: its highest mean of peaks, and the largest amplitude."""
+    """Return the worst over starts in words: its highest mean of peaks, and the largest amplitude."""
     if told["starts"] == 1:
         return "one start only: every run begins as the scene"
     if told["peak_ratio"] is None:

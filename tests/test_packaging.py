@@ -10,7 +10,7 @@ import pytest
 
 from tests.tools.extras import bare
 from tests.tools.input_files import DAMPED_BLOCK
-from vanedamp.studies.demo.figure_file import Structure
+from vanedamp.studies.demo.figure_file import FigureStructure
 
 ROOT = Path(__file__).parent.parent
 PARTS = ("files", "meshes", "modal", "rom", "coupling", "studies")
@@ -19,8 +19,8 @@ SUFFIXES = {".py", ".toml", ".html", ".js", ".css", ".msh"}
 
 def test_shipped_rigid_model_is_that_of_the_shipped_mesh(cluster_analysis, tmp_path):
     cluster_analysis.save(tmp_path / "modes.h5")
-    modes = Structure.load(tmp_path / "modes.h5", Path("rom.h5"))
-    shipped = Structure.shipped()
+    modes = FigureStructure.load(tmp_path / "modes.h5", Path("rom.h5"))
+    shipped = FigureStructure.shipped()
     for name in ("mass", "stiffness", "damping_ratio", "frequency", "amplitude"):
         assert getattr(shipped, name) == pytest.approx(getattr(modes, name), rel=1e-7)
 

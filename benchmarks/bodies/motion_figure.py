@@ -11,13 +11,13 @@ from matplotlib.patches import Ellipse, Polygon
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.studies.figures import BLUE, GOLD, GREY, RED, save, subplots
-from vanedamp.studies.report.motion import CLOSED, HIT, OPEN, Motion, motion_of
+from vanedamp.studies.report.motion import CLOSED, HIT, OPEN, RunFrames, motion_of
 
 _SAMPLES, _FRAMES = 200, 4
 _LIT = {CLOSED: GOLD, HIT: RED}
 
 
-def block_motion(scene: Scene) -> Motion:
+def block_motion(scene: Scene) -> RunFrames:
     """Run a scene of bodies in the plane, and return its last periods as they are drawn."""
     response = simulate(scene, events=True, samples_per_period=_SAMPLES)
     assert response.in_plane is not None
@@ -31,7 +31,7 @@ def block_motion(scene: Scene) -> Motion:
     )  # fmt: skip
 
 
-def motion_figure(motion: Motion, path: Path) -> None:
+def motion_figure(motion: RunFrames, path: Path) -> None:
     """Draw the one cavity of a motion in some frames in which contacts are hit, in the order of time."""
     (cavity,) = motion.cavities
     frames = _telling_frames(motion)
@@ -64,7 +64,7 @@ def motion_figure(motion: Motion, path: Path) -> None:
     save(figure, path)
 
 
-def _telling_frames(motion: Motion) -> list[int]:
+def _telling_frames(motion: RunFrames) -> list[int]:
     """Return frames in which a contact has just been hit, spread over the time; the first without any."""
     hit = np.array([contact.light == HIT for contact in motion.cavities[0].contacts])
     begun = np.flatnonzero((hit[:, 1:] & ~hit[:, :-1]).any(axis=0)) + 1

@@ -1,4 +1,4 @@
-"""Output of a calibration for further work: the case with the tuned numbers, and a scene with the rigid model."""
+"""Output files of a calibration: the case with the tuned parameters, and a scene with the rigid model."""
 
 from __future__ import annotations
 
@@ -26,33 +26,33 @@ _SCHEMA = "#:schema "
 
 
 def save_tuned_case(source: str | Path, calibration: Calibration, path: str | Path) -> None:
-    """Write the case file of a calibration with its tuned numbers, and all else as it was.
+    """Write the case file of a calibration with its tuned parameters; everything else is unchanged.
 
-    source: the case file that was calibrated. Files that it names stay the source's, relative to the new folder.
+    source: the case file that was calibrated. File names in it are rewritten relative to the new folder.
     """
     with replacing(path) as temporary:
         temporary.write_bytes(tuned_text(Path(source), calibration, Path(path)).encode())
 
 
 def save_rigid_scene(source: str | Path, calibration: Calibration, path: str | Path) -> None:
-    """Write a scene of the calibrated rigid model that runs: its cavities, one body in each, and a sweep.
+    """Write a complete scene of the calibrated rigid model: its cavities, one body in each, and a sweep.
 
-    The schema of scenes is written into its folder, for editors.
+    The JSON Schema of scenes is written into the same folder, for editors.
     """
     head = {"": f"The rigid model of {Path(source).name}, by vanedamp calibrate."}
     write_commented(path, rigid_scene(calibration), KINDS["scene"], head | _scene_notes(calibration))
 
 
 def tuned_text(source: Path, calibration: Calibration, target: Path) -> str:
-    """Return the text of a case file with the tuned numbers of its calibration, for a file at `target`."""
+    """Return the text of a case file with the tuned parameters of its calibration, for a file at `target`."""
     text = source.read_bytes().decode("utf-8-sig")
     document = tomlkit.parse(text)
     notes = [f"{source.name} calibrated by vanedamp calibrate; what was changed says so."]
     tuning = calibration.tuning
     if tuning is not None:
         reached = ", ".join(f"{value:.6g}" for value in tuning.after_hz)
-        asked = ", ".join(f"{value:.6g}" for value in tuning.target_hz)
-        notes.append(f"Frequencies: {reached} Hz, measured {asked} Hz.")
+        measured = ", ".join(f"{value:.6g}" for value in tuning.target_hz)
+        notes.append(f"Frequencies: {reached} Hz, measured {measured} Hz.")
         for name, factor in zip(tuning.names, tuning.factors.tolist(), strict=True):
             _tune(document, name, factor)
     if calibration.damping is not None:
@@ -71,7 +71,7 @@ def tuned_text(source: Path, calibration: Calibration, target: Path) -> str:
 def rigid_scene(calibration: Calibration) -> dict[str, Any]:
     """Return the tables of a scene with the rigid model of a calibration, its force and its cavities.
 
-    A case without cavities gets one; the bodies are a start (`_BODY`, `_GAPS`), to be replaced.
+    A case without cavities gets one; the bodies are placeholders (`_BODY`, `_GAPS`).
     """
     rigid, fatigue = calibration.rigid, calibration.analysis.fatigue
     structure: dict[str, Any] = {
@@ -155,26 +155,26 @@ def _tune(document: tomlkit.TOMLDocument, name: str, factor: float) -> None:
         return
     materials: Any = document["material"]
     if group not in materials:  # so far it had the default's
-        own = tomlkit.inline_table() if isinstance(materials, InlineTable) else tomlkit.table()
-        own.update(materials["default"].unwrap())
-        materials[group] = own
+        table = tomlkit.inline_table() if isinstance(materials, InlineTable) else tomlkit.table()
+        table.update(materials["default"].unwrap())
+        materials[group] = table
     for key in ("young", "young_at"):
         if key in materials[group]:
             _scale(materials[group], key, factor)
 
 
 def _scale(table: AbstractTable, key: str, factor: float) -> None:
-    """Multiply a number, every one of a list, or the second one of every pair in a table by a factor."""
+    """Multiply a number, all numbers of a list, or the second number of each pair by a factor."""
     old: Any = table[key]
     note = f"tuned: times {factor:.6g}"
     if not isinstance(old, Array):
         _change(table, key, factor * old, note)
         return
-    for place, entry in enumerate(old):
+    for index, entry in enumerate(old):
         if isinstance(entry, Array):
             entry[1] = _number(factor * entry[1])
         else:
-            old[place] = _number(factor * entry)
+            old[index] = _number(factor * entry)
     _remark(table, key, note)
 
 
@@ -210,12 +210,12 @@ def _rebase(document: tomlkit.TOMLDocument, old: Path, new: Path) -> None:
     """Name the files of a case from another folder."""
     if old == new:
         return
-    for place in FILES:
+    for key_path in FILES:
         table: Any = document
-        for step in place[:-1]:
+        for step in key_path[:-1]:
             table = table.get(step, {})
-        if place[-1] in table and not Path(table[place[-1]]).is_absolute():
-            table[place[-1]] = os.path.relpath(old / table[place[-1]], new)
+        if key_path[-1] in table and not Path(table[key_path[-1]]).is_absolute():
+            table[key_path[-1]] = os.path.relpath(old / table[key_path[-1]], new)
 
 
 def _rebased_schema(line: str, source: Path, target: Path) -> str:

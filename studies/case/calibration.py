@@ -1,4 +1,4 @@
-"""From measurements to a calibrated case: stiffness, damping, rigid model and excitation, one after the other."""
+"""From measurements to a calibrated case: stiffness, then damping, rigid model and excitation."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from vanedamp.studies.terminal import stage
 _NEAR = 0.1
 # from these on, relative, a warning: distance of the pole from the computed mode, error of the fit
 _OFF, _MISSED = 0.02, 0.1
-#: arrays of a tuning, by their keys in the results for machines
+#: arrays of a tuning, by their keys in the JSON results
 _TUNING = {
     "target_hz": "target_hz", "before_hz": "before_hz", "after_hz": "after_hz", "mode_before": "modes_before",
     "mode_after": "modes_after", "mac_before": "mac_before", "mac_after": "mac_after", "sensitivity": "sensitivities",
@@ -44,7 +44,7 @@ class MeasuredDamping:
     """The damping of the first bending in a measured response.
 
     file      of the measurement
-    response  what was measured in the band and half its width around it
+    response  measured in the band and half its width around it
     band      Hz, where poles were fitted
     poles     of the fit; `pole` is the one of the first bending
     """
@@ -81,13 +81,13 @@ class MeasuredDamping:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A case brought to its measurements.
+    """A case calibrated with its measurements.
 
     analysis  modes of the calibrated case
     rigid     the first bending at the response coordinate, with the calibrated damping ratio
     tuning    None where nothing was tuned
     damping   None where the damping ratio is the case's
-    warnings  what to look at: those of the analysis, and a response that does not look like the first bending's
+    warnings  of the analysis, and of a response that differs from the first bending's
     """
 
     case: Case
@@ -106,7 +106,7 @@ class Calibration:
 
     @property
     def record(self) -> CalibrationRecord:
-        """What the file of the calibration has."""
+        """Content of the calibration file."""
         bending = self.analysis.first_bending
         assert bending is not None
         arrays: dict[str, Any] = {}
@@ -136,11 +136,11 @@ class Calibration:
     def to_json(self) -> dict[str, Any]:
         """Return the result as plain data."""
         record = self.record
-        told = record.plain()
+        data = record.plain()
         return {
             "status": "ok",
             "frequency_hz": record.frequencies_hz.tolist(),
-            **{name: told[name] for name in ("first_bending", "rigid", "cavity", "damping", "excitation")},
+            **{name: data[name] for name in ("first_bending", "rigid", "cavity", "damping", "excitation")},
             "tuning": None if self.tuning is None else _tuning_json(self.tuning, self.case),
             "warnings": list(self.warnings),
             "wall_time_s": self.wall_time_s,
@@ -177,12 +177,12 @@ class Calibration:
 
 
 def calibrate(case: Case, checkpoint: str | Path | None = None) -> Calibration:
-    """Tune the stiffness if frequencies are given, take the damping from a response if one is given, then calibrate.
+    """Tune the stiffness to frequencies and take the damping from a response, if these are given, then calibrate.
 
     checkpoint: a file to which evaluations of the tuning are written and from which an interrupted call resumes; the
-    caller removes it once the result is safe (files.checkpoint_file.clear).
-    Raises InputError for a case without an interface or a first bending, and the errors of the modal package for what
-    cannot be met.
+    caller removes it after the result is saved (files.checkpoint_file.clear).
+    Raises InputError for a case without an interface or a first bending, and the errors of the modal package for data
+    that it cannot reproduce.
     """
     started = time.perf_counter()
     if case.response_label is None:
@@ -190,10 +190,10 @@ def calibrate(case: Case, checkpoint: str | Path | None = None) -> Calibration:
     table = case.calibration or CalibrationTable()
     structure, tuning = assemble(case), None
     if table.tune is not None:
-        # what follows the tuning may be changed before it resumes
+        # tables for later steps may change before the tuning resumes
         tuned = replace(case, calibration=CalibrationTable(tune=table.tune))
-        with CaseCheckpoint(checkpoint, "calibrate", tuned, structure.matrices) as kept:
-            tuning = _tuned(structure, table.tune, kept.next)
+        with CaseCheckpoint(checkpoint, "calibrate", tuned, structure.matrices) as memo:
+            tuning = _tuned(structure, table.tune, memo.next)
         structure = assemble(tuned_case(case, dict(zip(tuning.names, tuning.factors.tolist(), strict=True)), structure))
     analysis = modal_analysis(structure)
     if analysis.first_bending is None or analysis.functional is None:
@@ -217,9 +217,9 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
     """Return the case with Young's moduli and support stiffnesses times their factors."""
     material: dict[str, MaterialTable] = dict(case.material)
     elastic = dict(case.support.elastic)
-    known = parts_by_name(case, structure.solid.domain.volumes)
+    parts = parts_by_name(case, structure.solid.domain.volumes)
     for name, factor in factors.items():
-        for part in known[name]:
+        for part in parts[name]:
             kind, group = part.split(".", 1)
             if kind == "support":
                 springs = elastic[group]
@@ -231,26 +231,26 @@ def tuned_case(case: Case, factors: dict[str, float], structure: Structure) -> C
                     tangential=factor * springs.tangential,
                 )
             else:
-                own = material.get(group, case.material.get("default"))
-                assert own is not None
-                young_at = tuple((temperature, factor * young) for temperature, young in own.young_at)
-                material[group] = replace(own, young=factor * own.young, young_at=young_at)
+                table = material.get(group, case.material.get("default"))
+                assert table is not None
+                young_at = tuple((temperature, factor * young) for temperature, young in table.young_at)
+                material[group] = replace(table, young=factor * table.young, young_at=young_at)
     return replace(case, material=material, support=replace(case.support, elastic=elastic))
 
 
 @stage("tuning to the measured frequencies")
 def _tuned(structure: Structure, table: TuneTable, keep: Keep) -> Tuning:
-    """Return what tunes the structure. Raises InputError for an unknown name in `vary`, and for parts that overlap."""
-    known = parts_by_name(structure.case, structure.solid.domain.volumes)
+    """Return the tuning of the stiffness. Raises InputError for unknown names in `vary`, and for overlapping parts."""
+    parts = parts_by_name(structure.case, structure.solid.domain.volumes)
     seen: set[str] = set()
     for name in table.vary:
-        if name not in known:
-            raise InputError(f"calibration.tune.vary: no part '{name}'; {nearest(name, list(known))}")
-        if seen & set(known[name]):
+        if name not in parts:
+            raise InputError(f"calibration.tune.vary: no part '{name}'; {nearest(name, list(parts))}")
+        if seen & set(parts[name]):
             raise InputError(f"calibration.tune.vary: '{name}' holds a part that another name holds, too; name it once")
-        seen |= set(known[name])
-    parts = structure.solid.stiffness_parts()
-    varied = {name: sparse.csr_array(sum(parts[part] for part in known[name])) for name in table.vary}
+        seen |= set(parts[name])
+    stiffness = structure.solid.stiffness_parts()
+    varied = {name: sparse.csr_array(sum(stiffness[part] for part in parts[name])) for name in table.vary}
     measured = None if table.shapes is None else read_shapes(table.shapes)
     return tune(structure.matrices, varied, table.frequencies, measured, table.modes, starts=table.starts, keep=keep)
 
@@ -272,7 +272,7 @@ def _damping(table: DampingTable, frequency: float) -> tuple[MeasuredDamping, li
 
 
 def _poles(frf: Frf, band: tuple[float, float], count: int, frequency: float) -> Poles:
-    """Return the modes of the band. A refusal names the response's peak and the computed mode."""
+    """Return the modes of the band. If the fit fails, the error names the response's peak and the computed mode."""
     try:
         inside = frf.band(*band)
         poles = identify(inside, count)
@@ -319,10 +319,10 @@ def _tuning_json(tuning: Tuning, case: Case) -> dict[str, Any]:
 
 
 def parts_by_name(case: Case, volumes: Iterable[str]) -> dict[str, list[str]]:
-    """Return every name that `vary` may hold, with the parts of Solid.stiffness_parts that it stands for."""
+    """Return every permitted name of `vary`, with its parts of Solid.stiffness_parts."""
     groups = list(volumes)
     names = {f"material.{group}": [f"material.{group}"] for group in groups}
-    rest = [f"material.{group}" for group in groups if group not in case.material]
-    if "default" in case.material and rest:
-        names["material.default"] = rest
+    default_groups = [f"material.{group}" for group in groups if group not in case.material]
+    if "default" in case.material and default_groups:
+        names["material.default"] = default_groups
     return names | {f"support.{group}": [f"support.{group}"] for group in case.support.elastic}

@@ -1,4 +1,4 @@
-"""The tables [calibration] and [hot_spots] of a case: measurements, what is tuned to them, where strength counts."""
+"""The tables [calibration] and [hot_spots] of a case: measurements, tuned parameters, and where strength counts."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class TuneTable:
 
 @dataclass(frozen=True, config=STRICT)
 class CalibrationTable:
-    """The data of `vanedamp calibrate`, besides the case itself."""
+    """The data of `vanedamp calibrate`, in addition to the case itself."""
 
     share: Annotated[Real, Field(gt=0, le=1)] = 0.7
     """fraction of the fatigue strength that the stress reaches at resonance, which sets the excitation [-]"""

@@ -1,4 +1,4 @@
-"""Solutions of a long command on a case, on disk, with which the same command begins after a kill."""
+"""Solutions of a long command on a case, stored on disk so that the same command can resume after a kill."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from vanedamp.studies.case.tables import Case
 
 
 class CaseCheckpoint(CheckpointFile):
-    """Solutions in the order in which a command asks for them (path None: nothing is kept)."""
+    """Solutions in the order in which a command requests them (path None: nothing is stored)."""
 
     def __init__(self, path: str | Path | None, command: str, case: Case, matrices: SystemMatrices) -> None:
-        """Take up the file's solutions. Raises InputError for a file of another case, or one that cannot be read."""
+        """Load the file's solutions. Raises InputError for a file of another case, or one that cannot be read."""
         belongs: dict[str, tuple[str, Mapping[str, Any]]] = {
             "case": ("case", json.loads(json.dumps(tables(case)))),
             "matrices": ("mesh", matrices.provenance),
@@ -32,11 +32,11 @@ class CaseCheckpoint(CheckpointFile):
         }
         super().__init__(path, f"{command}-checkpoint", belongs, self._content)
         self._solutions: list[dict[str, np.ndarray]] = []
-        self._asked, self._kept = 0, path is not None
-        if (found := self.read()) is not None:
-            self._solutions = [{} for _ in found[0]["solution"]]
-            for place, values in found[0].items():
-                name, of, number = place.partition(" ")
+        self._requested, self._stores = 0, path is not None
+        if (content := self.read()) is not None:
+            self._solutions = [{} for _ in content[0]["solution"]]
+            for key, values in content[0].items():
+                name, of, number = key.partition(" ")
                 if of:  # no dimension
                     self._solutions[int(number)] |= {name: values}
 
@@ -47,15 +47,15 @@ class CaseCheckpoint(CheckpointFile):
         super().__exit__(kind, *rest)
 
     def next(self, solve: Callable[[], Arrays]) -> Arrays:
-        """Return the next solution: the file's, or else that of the function (modal.kept_solutions.Keep)."""
-        self._asked += 1
-        if self._asked <= len(self._solutions):
-            return self._solutions[self._asked - 1]
-        found = solve()
-        if self._kept:
-            self._solutions.append(dict(found))
+        """Return the next solution, from the file or computed by the function (modal.kept_solutions.Keep)."""
+        self._requested += 1
+        if self._requested <= len(self._solutions):
+            return self._solutions[self._requested - 1]
+        solution = solve()
+        if self._stores:
+            self._solutions.append(dict(solution))
             self.changed()
-        return found
+        return solution
 
     def _content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
         variables = {"solution": Variable(np.arange(len(self._solutions)), ("solution",))}

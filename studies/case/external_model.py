@@ -1,4 +1,4 @@
-"""Import of another code's reduced model: a TOML file with the location and meaning of its matrices."""
+"""Import of a reduced model of another code: a TOML file describes where its matrices are and what they mean."""
 
 from __future__ import annotations
 
@@ -113,10 +113,10 @@ class External:
 
 
 def _check_rows(files: dict[str, Path]) -> None:
-    """Raise InputError for matrices, by key, whose files give their rows to different nodes."""
+    """Raise InputError if the files of matrices, by key, assign their rows to different nodes."""
     rows = {key: freedoms for key, file in files.items() if (freedoms := row_freedoms(file)) is not None}
-    for (first, ones), (key, others) in itertools.pairwise(rows.items()):
-        odd = {tuple(row) for row in ones.tolist()} ^ {tuple(row) for row in others.tolist()}
+    for (first, before), (key, after) in itertools.pairwise(rows.items()):
+        odd = {tuple(row) for row in before.tolist()} ^ {tuple(row) for row in after.tolist()}
         if odd:
             node, freedom = min(odd)
             raise InputError(
@@ -126,7 +126,7 @@ def _check_rows(files: dict[str, Path]) -> None:
 
 
 def _doubts(model: ReducedModel) -> tuple[str, ...]:
-    """Return a warning when mass or frequency of the first straining mode hint at wrong units."""
+    """Return a warning if the mass or the frequency of the first elastic mode suggests wrong units."""
     first = model.rigid_modes
     if first == model.size:
         return ()
@@ -144,10 +144,10 @@ def _matrix(key: str, name: str, in_file: dict[str, np.ndarray], folder: Path) -
         raise InputError("matrices.file: holds one matrix without a name; name the file as mass or stiffness instead")
     if in_file and not Path(name).suffix:
         raise InputError(f"{key}: no matrix {name!r} in the file; {nearest(name.lower(), list(in_file))}")
-    own = {} if Path(name).suffix == "" else read_matrices(folder / name)
-    if "" not in own:
+    matrices = {} if Path(name).suffix == "" else read_matrices(folder / name)
+    if "" not in matrices:
         raise InputError(
             f"{key}: {name!r} is the name of a matrix, or of a file of several: name the file in matrices.file and the "
             "matrix here; or here a file of one matrix (.csv, .mtx, .npy, scipy's save_npz)"
         )
-    return own[""]
+    return matrices[""]

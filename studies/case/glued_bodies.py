@@ -1,7 +1,7 @@
-"""Bodies fixed in their cavities: meshed as a part of the cluster, against masses added to a reduced model.
+"""Bodies fixed in their cavities: meshed with the cluster, compared with masses added to a reduced model.
 
-The second is what scenes assume of a body that sticks. It knows the tangential motion of the floor only; the meshed
-body also moves radially and turns, and stiffens the shroud that it is bonded to. The record separates the two.
+Scenes assume the second for a sticking body. It includes only the tangential motion of the floor; the meshed
+body also moves radially, rotates, and stiffens the shroud that it is bonded to. The record separates both effects.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ class TiedComparison:
 
     @property
     def difference(self) -> float:
-        """Of the meshed bodies from the added masses, relative."""
+        """Relative difference of the frequency with meshed bodies from that with added masses."""
         return self.tied_hz / self.added_mass_hz - 1.0
 
     @property
     def stiffening(self) -> float:
-        """Relative rise of the frequency by the bodies' stiffness only."""
+        """Relative rise of the frequency due to the bodies' stiffness only."""
         return self.weightless_hz / self.free_hz - 1.0
 
 

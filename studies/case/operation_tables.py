@@ -1,4 +1,4 @@
-"""The tables of a case about its operation: [rotation], [campbell] and [temperature]."""
+"""The tables of a case for its operating conditions: [rotation], [campbell] and [temperature]."""
 
 from __future__ import annotations
 
@@ -93,8 +93,8 @@ class CampbellTable:
             raise ValueError("operating: expected the lowest speed, then the highest")
         if (self.speed is None) == (self.rpm is None):
             raise ValueError("give one of speed (rad/s) and rpm, a list or a range {start = 0, stop = 6000, num = 31}")
-        key, given = ("rpm", self.rpm) if self.speed is None else ("speed", self.speed)
-        count = given.num if isinstance(given, Range) else len(given or ())
+        key, values = ("rpm", self.rpm) if self.speed is None else ("speed", self.speed)
+        count = values.num if isinstance(values, Range) else len(values or ())
         if not 2 <= count <= _MOST:
             raise ValueError(f"{key}: {count} speeds; expected 2 to {_MOST}")
         speeds = self.speeds

@@ -1,4 +1,4 @@
-"""The interference diagram of a case's ring: its modes, over the speeds of [campbell] if it has such a table."""
+"""The interference diagram of a case's ring: its modes, versus speed if the case has a table [campbell]."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.case.stages import campbell_diagram
 from vanedamp.studies.case.structure import Structure
 
-#: about the speed of [rotation], speeds of operation where nothing says them
+#: relative half width of the operating range around the speed of [rotation], if none is given
 _ABOUT = 0.05
 
 
@@ -29,24 +29,24 @@ def ring_interference(
 ) -> Interference:
     """Return the interference of the modes of a structure's ring with engine orders.
 
-    operating: lowest and highest speed, rad/s, by default those of [campbell], or 5 % about that of [rotation];
-    orders: by default those of [campbell], or 1 to the number of sectors; report: called with the number of diameters
-    done, and of all, for the Campbell diagram; checkpoint: of its solutions (campbell_diagram). Raises InputError for
+    operating: lowest and highest speed, rad/s, by default from [campbell], or 5 % around the speed of [rotation];
+    orders: by default from [campbell], or 1 to the number of sectors; report: called with the number of diameters
+    done and their total, for the Campbell diagram; checkpoint: as for campbell_diagram. Raises InputError for
     an engine order that is no whole number.
     """
     table, rotation = structure.case.campbell, structure.case.rotation
-    given = orders or (table.engine_orders if table else ()) or ()
-    if any(order != int(order) or order < 1 for order in given):
+    engine_orders = orders or (table.engine_orders if table else ()) or ()
+    if any(order != int(order) or order < 1 for order in engine_orders):
         raise InputError("engine orders: expected whole numbers from 1, since a fraction excites every nodal diameter")
     speed = rotation.omega if rotation is not None else None
     if operating is None and table is not None:
         operating = table.operation
     if operating is None and speed:
         operating = ((1.0 - _ABOUT) * speed, (1.0 + _ABOUT) * speed)
-    found = Interference(modes, tuple(int(order) for order in given), speed, operating)
+    interference = Interference(modes, tuple(int(order) for order in engine_orders), speed, operating)
     if table is None:
-        return found
-    wanted = replace(table, modes=int(modes.families.max()) + 1, engine_orders=found.orders)
+        return interference
+    wanted = replace(table, modes=int(modes.families.max()) + 1, engine_orders=interference.orders)
     diagram = campbell_diagram(replace(structure, case=replace(structure.case, campbell=wanted)), report, checkpoint)
     rows = {pair: row for row, pair in enumerate(_pairs(modes))}
     curves = [rows.get(pair) for pair in _pairs(diagram)]
@@ -54,9 +54,9 @@ def ring_interference(
     for row, curve in zip(curves, diagram.frequencies_hz, strict=True):
         if row is not None:
             over[row] = curve
-    crossings = [(each, curves[each.mode]) for each in diagram.crossings]
-    kept = tuple(replace(each, mode=row) for each, row in crossings if row is not None)
-    return replace(found, speeds=diagram.speeds, over_speed_hz=over, crossings=kept)
+    crossings = [(crossing, curves[crossing.mode]) for crossing in diagram.crossings]
+    renumbered = tuple(replace(crossing, mode=row) for crossing, row in crossings if row is not None)
+    return replace(interference, speeds=diagram.speeds, over_speed_hz=over, crossings=renumbered)
 
 
 def _pairs(modes: RingModes | Campbell) -> list[tuple[int, int]]:

@@ -34,7 +34,7 @@ def ring_analysis(structure: Structure, report: Callable[[int, int], None] | Non
     """Return the modes of every nodal diameter, as many as [modes] asks for, with the gyroscopic coupling if the case
     wants it.
 
-    report: called with the number of diameters done, and of all. Raises what `ring_sector` and `ring_modes` raise.
+    report: called with the number of diameters done and their total. Raises the errors of `ring_sector`, `ring_modes`.
     """
     table, rotation, sector = structure.case.modes, structure.case.rotation, ring_sector(structure)
     count = table.count or MODES
@@ -51,8 +51,8 @@ def ring_reduction(
     """Reduce the ring to `families` modes of every nodal diameter, or all up to a frequency, and its interface.
 
     A ring that rotates is reduced for all speeds up to the maximum of its case. report: called with the number of
-    diameters done, and of all; basis: as of `rom.ring.reduction.reduce_ring`. Raises InputError without the table
-    [ring] or interface coordinates, and what reduce_ring raises.
+    diameters done and their total; basis: as for `rom.ring.reduction.reduce_ring`. Raises InputError without the table
+    [ring] or interface coordinates, and the errors of reduce_ring.
     """
     case = structure.case
     if case.ring is None:

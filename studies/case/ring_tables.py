@@ -86,8 +86,8 @@ class RingTable:
             check_angle(first - point, second - point, self.sectors, np.array(axis) / np.linalg.norm(axis), size)
 
     def _axis(self, rotation: RotationTable | None) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        own: RingTable | RotationTable = self if rotation is None else rotation
-        return own.axis or (0.0, 0.0, 1.0), own.point or (0.0, 0.0, 0.0)
+        table: RingTable | RotationTable = self if rotation is None else rotation
+        return table.axis or (0.0, 0.0, 1.0), table.point or (0.0, 0.0, 0.0)
 
     def sector(self, matrices: SystemMatrices, rotation: RotationTable | None) -> CyclicSector:
         """Return the sector with these matrices; rotation: has the axis unless the table does. Raises CyclicError."""

@@ -58,23 +58,23 @@ from vanedamp.studies.case.tables import Case, InterfaceTable, MeshFile
 from vanedamp.studies.hot_spots import level_warnings, spot_warnings
 from vanedamp.studies.terminal import stage
 
-# a mode so near the first bending, relative, that moves its point with such a fraction of its compliance, is reported
+# a mode within this relative distance of the first bending is reported if its relative compliance exceeds the limit
 _NEAR, _NOTABLE = 0.02, 0.01
-#: modes that are computed unless the case says; frequency up to which a reduced model is judged, over the first bending
+#: default number of modes; frequency up to which a reduced model is evaluated, relative to the first bending
 MODES, _REACH = 10, 1.5
 _UNCOUNTED = (
     "modes: found iteratively: spare modes guard against a missed one, but only factors prove that there is none "
     '(solver = "factor")'
 )
 _SECTOR_ONLY = "ring: these are modes of one sector whose faces are free; `vanedamp ring` has those of the ring"
-# modes at which the search for enough of them starts and gives up
+# numbers of modes with which the search starts and at which it stops
 _START, _MOST = 16, 64
 
 
 @stage("mesh and matrices")
 def assemble(case: Case) -> Structure:
     """Return mesh, groups and matrices. Raises the errors of the modal package, and InputError for unknown groups."""
-    label = case.response_label  # an open choice is rejected before the work
+    label = case.response_label  # an ambiguous choice is rejected before the work
     with _mesh(case) as path:
         scale = case.mesh.scale if isinstance(case.mesh, MeshFile) else 1.0
         materials = {
@@ -90,7 +90,7 @@ def assemble(case: Case) -> Structure:
         domain = solid.domain
         case.check_groups(domain.facets, domain.volumes, {"edge": domain.edges, "point": domain.points})
         ring = case.ring
-        statics = Statics() if ring is None else RingStatics(lambda given: ring.sector(given, case.rotation))
+        statics = Statics() if ring is None else RingStatics(lambda assembled: ring.sector(assembled, case.rotation))
         matrices = solid.assemble(case.support.clamped, case.damping_ratio, statics)
     if label is not None:
         _functional(case, matrices, label)
@@ -102,7 +102,7 @@ def assemble(case: Case) -> Structure:
 
 
 def _temperature(table: TemperatureTable | None) -> Temperature | None:
-    """Return the temperature as the finite elements take it. Raises what read_temperature raises."""
+    """Return the temperature in the form that the finite elements need. Raises the errors of read_temperature."""
     if table is None:
         return None
     if table.file is not None:
@@ -130,7 +130,7 @@ def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:
 
 
 def base_inertia(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray | None:
-    """Return M r (N,) of a translation of the base along a label's direction; None of a rotation, which has none."""
+    """Return M r (N,) of a translation of the base along a label's direction; None for a rotation."""
     (coordinate, *_) = interface(case, matrices, [label]).coordinates
     if coordinate.motion == "rotation":
         return None
@@ -139,7 +139,7 @@ def base_inertia(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray
 
 
 def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
-    """Return the case's interface coordinates on its matrices, all of them or those named."""
+    """Return the case's interface coordinates on its matrices, all or the named ones."""
     tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
     coordinates = [item for label, table in tables.items() for item in _coordinates(label, table, matrices)]
     return Interface.on_patches(matrices, coordinates)
@@ -164,24 +164,24 @@ def _coordinates(label: str, table: InterfaceTable, matrices: SystemMatrices) ->
 
 
 def _direction(
-    label: str, key: str, given: tuple[float, float, float] | str, table: InterfaceTable, matrices: SystemMatrices
+    label: str, key: str, choice: tuple[float, float, float] | str, table: InterfaceTable, matrices: SystemMatrices
 ) -> tuple[float, float, float]:
-    """Return a direction of a table: numbers, "normal" for its facets' own, or the normal of a facet group."""
-    if not isinstance(given, str):
-        return given
+    """Return a direction of a table: numbers, "normal" for that of its own facets, or the normal of a facet group."""
+    if not isinstance(choice, str):
+        return choice
     try:
-        return normal_direction(matrices, table.facets) if given == "normal" else outward_normal(matrices, given)
+        return normal_direction(matrices, table.facets) if choice == "normal" else outward_normal(matrices, choice)
     except InterfaceError as error:
         raise InputError(f"interface.{label}.{key}: {error}") from None
 
 
 @dataclass(frozen=True)
-class Fatigue:
+class FatigueLevel:
     """The level at which the first bending's stress reaches a fraction of the fatigue strength.
 
     share      fraction of the strength
     amplitude  m, displacement of the response coordinate
-    spot       where the stress does; its stress is that of the amplitude 1 m
+    spot       where the stress reaches it; its stress is for an amplitude of 1 m
     peaks      of every volume group, for this amplitude, from which other strengths give another level
     moved      displacement of the response coordinate over the structure's largest one
     """
@@ -193,7 +193,7 @@ class Fatigue:
     moved: float
 
     @classmethod
-    def of(cls, case: Case, peaks: Sequence[PeakStress], moved: float) -> Fatigue | None:
+    def of(cls, case: Case, peaks: Sequence[PeakStress], moved: float) -> FatigueLevel | None:
         """Return the level of a case; None without a fatigue strength."""
         table, strengths = case.calibration or CalibrationTable(), case.strengths(peak.group for peak in peaks)
         if not strengths:
@@ -216,14 +216,14 @@ class ModalAnalysis:
     """Modes and their results.
 
     effective_mass  (m, 3) kg along x, y, z; movable_mass (3,) kg is their sum over all modes
-    first_bending   index of the mode that carries most mass along `direction`, or is most like the case's shape; None
-                    when a free structure, or a range of frequencies, has no such mode
+    first_bending   index of the mode with most effective mass along `direction`, or most like the case's shape; None
+                    if a free structure, or a range of frequencies, has no such mode
     rigid           that mode as one mass on a spring, at its interface coordinate; None without either
     cavities        how that mode moves the case's cavities, those interface coordinates that move across, too, by label
     functional      (N,) that coordinate; None without
     fatigue         of that mode; None without a rigid model or a fatigue strength
-    warnings        points to check: frequencies that hint at wrong units, the reason for no first bending
-    gyroscopic      as many modes with the gyroscopic coupling, if the case wants them
+    warnings        such as frequencies that suggest wrong units, or the reason for no first bending
+    gyroscopic      the same number of modes with the gyroscopic coupling, if the case includes it
     """
 
     structure: Structure
@@ -233,7 +233,7 @@ class ModalAnalysis:
     rigid: RigidModel | None
     cavities: dict[str, CavityMotion]
     functional: np.ndarray | None
-    fatigue: Fatigue | None
+    fatigue: FatigueLevel | None
     warnings: tuple[str, ...]
     wall_time_s: float
     gyroscopic: GyroscopicModes | None = None
@@ -287,31 +287,31 @@ class ModalAnalysis:
             field = nodal_von_mises(self.structure.solid, shape / (self.functional @ shape))
             variables["von_mises"] = Variable(field, ("node",), "Pa/m")
         if self.fatigue is not None:
-            stress, places, groups, errors, singular = zip(*self.fatigue.peaks, strict=True)
+            stress, positions, groups, errors, singular = zip(*self.fatigue.peaks, strict=True)
             variables |= {
                 "volume": Variable(np.array(groups, dtype=object), ("volume",)),
                 "stress_per_amplitude": Variable(np.array(stress), ("volume",), "Pa/m"),
-                "stress_place": Variable(np.array(places), ("volume", "axis"), "m"),
+                "stress_place": Variable(np.array(positions), ("volume", "axis"), "m"),
                 "stress_error": Variable(np.array(errors), ("volume",)),
                 "stress_singular": Variable(np.array(singular, dtype=object), ("volume",)),
             }
         result = self.to_json()
-        kept = ("first_bending", "rigid", "cavity", "fatigue", "speed")
-        attributes = {name: result[name] for name in kept if result.get(name) not in (None, {})}
+        keys = ("first_bending", "rigid", "cavity", "fatigue", "speed")
+        attributes = {name: result[name] for name in keys if result.get(name) not in (None, {})}
         attributes |= {"damping_ratio": self.structure.matrices.damping_ratio}
         attributes |= {"vtk_cell_type": cell_type, "versions": versions()}
         self.modes.save(path, variables, attributes)
 
 
-def set_level(path: Path, case: Case) -> Fatigue | None:
-    """Write the fatigue level of a case into the file of its modes, and return it; None if that lacks stresses."""
+def set_level(path: Path, case: Case) -> FatigueLevel | None:
+    """Write the fatigue level of a case into the file of its modes, and return it; None if the file lacks stresses."""
     kind, variables, attributes = load_any(path)
     names = ("stress_per_amplitude", "stress_place", "volume", "stress_error", "stress_singular")
     if not set(names) <= set(variables):
         return None
     moved = json.loads(attributes["fatigue"])["moved"]
     columns = (variables[name].values.tolist() for name in names)
-    level = Fatigue.of(case, [PeakStress(*entries) for entries in zip(*columns, strict=True)], moved)
+    level = FatigueLevel.of(case, [PeakStress(*entries) for entries in zip(*columns, strict=True)], moved)
     if level is not None:
         save(path, kind, variables, attributes | {"fatigue": level.to_json()})
     return level
@@ -351,7 +351,7 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     )  # fmt: skip
 
 
-def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.ndarray) -> Fatigue | None:
+def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.ndarray) -> FatigueLevel | None:
     """Return the fatigue level of a mode; None without a fatigue strength."""
     if structure.case.fatigue_strength is None:
         return None
@@ -360,11 +360,11 @@ def _fatigue(structure: Structure, modes: Modes, bending: int, functional: np.nd
         unit = shape / abs(float(functional @ shape))
         moved = 1.0 / float(np.linalg.norm(unit.reshape(-1, 3), axis=1).max())
         peaks = peak_stresses(structure.solid, unit, structure.matrices, excluded_places(structure))
-    return Fatigue.of(structure.case, peaks, moved)
+    return FatigueLevel.of(structure.case, peaks, moved)
 
 
 def strength_warnings(structure: Structure) -> tuple[str, ...]:
-    """Return a warning of volume groups whose material has no fatigue strength, so that the least of all counts."""
+    """Return a warning of volume groups without a fatigue strength, for which the lowest strength is used."""
     groups = structure.case.without_strength(structure.solid.domain.volumes)
     if not groups:
         return ()
@@ -377,7 +377,7 @@ def strength_warnings(structure: Structure) -> tuple[str, ...]:
 def _cavities(
     case: Case, matrices: SystemMatrices, shape: np.ndarray, functional: np.ndarray
 ) -> dict[str, CavityMotion]:
-    """Return how a mode's shape moves the case's cavities, without those that it does not move along."""
+    """Return the motion of the case's cavities in a mode, without cavities that do not move along their direction."""
     planar = [label for label, table in case.interface.items() if table.planar]
     motions = {label: cavity_motion(shape, interface(case, matrices, [label]).vectors, functional) for label in planar}
     return {label: motion for label, motion in motions.items() if motion is not None}
@@ -385,10 +385,10 @@ def _cavities(
 
 @stage("modes")
 def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) -> Modes:
-    """Return the case's modes, multiple ones turned to the response coordinate, or else to the bending's direction."""
+    """Return the case's modes, multiple ones rotated to the response coordinate, or else to the bending direction."""
     table, size = case.modes, matrices.free.size
     count = table.count or MODES
-    # one more, so that the last of them is not half of a pair
+    # one more mode, so that the last one is not half of a pair
     more = count + 1 if count < size else count
     modes = solve_modes(matrices, more, table.max_frequency, table.min_frequency, table.solver)
     inertia = matrices.mass @ (matrices.movable_translations() @ unit_direction(table.direction))
@@ -398,7 +398,7 @@ def _modes(case: Case, matrices: SystemMatrices, functional: np.ndarray | None) 
 
 
 def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> tuple[str, ...]:
-    """Return a warning when another mode moves the response coordinate at nearly the same frequency."""
+    """Return a warning if another mode moves the response coordinate at nearly the same frequency."""
     near = rivals(modes, bending, functional, _NEAR, _NOTABLE)
     if not near.size:
         return ()
@@ -413,9 +413,9 @@ def _rivals(modes: Modes, bending: int, functional: np.ndarray, label: str) -> t
 def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[int | None, tuple[str, ...]]:
     """Return the first bending among the modes that strain the structure, or None and the reason.
 
-    It is the mode most like the case's shape, or the one of most effective mass along its direction.
+    It is the mode most similar to the case's shape, or the one with most effective mass along its direction.
 
-    Raises ParticipationError for a held structure whose lowest modes lack it.
+    Raises ParticipationError for a supported structure without it among the lowest modes.
     """
     elastic = np.flatnonzero(modes.frequencies_hz > 0.0)
     rigid = len(modes) - elastic.size
@@ -436,7 +436,7 @@ def _first_bending(case: Case, modes: Modes, matrices: SystemMatrices) -> tuple[
 
 
 def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[str, ...]:
-    """Return a warning when sizes, masses, sound speeds or the first straining frequency hint at wrong units."""
+    """Return a warning if sizes, masses, sound speeds or the first elastic frequency suggest wrong units."""
     matrices = structure.matrices
     materials = {name: (table.young, table.density) for name, table in structure.case.material.items()}
     remarks = doubts(materials, float(np.ptp(matrices.coordinates, axis=0).max()), matrices.total_mass, first_hz)
@@ -444,25 +444,25 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
 
 
 def joint_doubts(structure: Structure, modes: Modes | None = None) -> tuple[str, ...]:
-    """Return warnings of nodes that lie where others do, and of modes of a held structure without strain."""
+    """Return warnings of coincident nodes, and of strain-free modes of a supported structure."""
     matrices, support = structure.matrices, structure.case.support
-    found, twins = [], coincident_nodes(matrices)
+    warnings, twins = [], coincident_nodes(matrices)
     if twins.size:
-        place = ", ".join(f"{x:.4g}" for x in matrices.coordinates[twins[0]])
-        found.append(
-            f"mesh: {twins.size} nodes lie where others do, such as at ({place}) m: parts are not joined there; merge "
+        point = ", ".join(f"{x:.4g}" for x in matrices.coordinates[twins[0]])
+        warnings.append(
+            f"mesh: {twins.size} nodes lie where others do, such as at ({point}) m: parts are not joined there; merge "
             "the nodes, unless a gap is meant"
         )
     if modes is not None and (support.clamped or support.elastic):
-        whole, parts = free_motions(modes, matrices)
+        whole, relative = free_motions(modes, matrices)
         if whole:
-            found.append(f"support: leaves {whole} motions of the whole structure free (0 Hz); hold it against them")
-        if parts:
-            found.append(
-                f"modes: {parts} at 0 Hz move parts of the structure against each other, which hang together by an "
+            warnings.append(f"support: leaves {whole} motions of the whole structure free (0 Hz); hold it against them")
+        if relative:
+            warnings.append(
+                f"modes: {relative} at 0 Hz move parts of the structure against each other, which hang together by an "
                 "edge or a point only; join their nodes"
             )
-    return tuple(found)
+    return tuple(warnings)
 
 
 def campbell_diagram(
@@ -470,11 +470,11 @@ def campbell_diagram(
     report: Callable[[int, int], None] | None = None,
     checkpoint: str | Path | None = None,
 ) -> Campbell:
-    """Return the Campbell diagram that the case's tables [campbell] and [rotation] ask for.
+    """Return the Campbell diagram of the case's tables [campbell] and [rotation].
 
-    report: called with the number of full solutions made, and of those known to be needed; checkpoint: a file to which
-    these are written and from which an interrupted call resumes; the caller removes it once the result is safe
-    (files.checkpoint_file.clear). Of a ring, modes of every nodal diameter. Raises the errors of
+    report: called with the number of full solutions done and the number needed so far; checkpoint: a file to which
+    they are written and from which an interrupted call resumes; the caller removes it after the result is saved
+    (files.checkpoint_file.clear). For a ring, modes of every nodal diameter. Raises the errors of
     `modal.campbell.campbell`.
     """
     table, rotation = structure.case.campbell, structure.case.rotation
@@ -484,10 +484,10 @@ def campbell_diagram(
     if table.modes > most:
         raise InputError(f"campbell.modes: expected at most {most}, the free DOFs, not {table.modes}")
     ring = structure.case.ring
-    made = campbell if ring is None else partial(ring_campbell, ring.sector(rotating.standing, rotation))
-    with CaseCheckpoint(checkpoint, "campbell", replace(structure.case, calibration=None), structure.matrices) as kept:
-        diagram = made(
-            rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report, keep=kept.next
+    solve = campbell if ring is None else partial(ring_campbell, ring.sector(rotating.standing, rotation))
+    with CaseCheckpoint(checkpoint, "campbell", replace(structure.case, calibration=None), structure.matrices) as memo:
+        diagram = solve(
+            rotating, table.speeds, table.engine_orders, table.modes, rotation.gyroscopic, report=report, keep=memo.next
         )
     provenance = {"matrices": dict(diagram.provenance), "versions": versions()}
     return replace(diagram, operating=table.operation, provenance=provenance)
@@ -505,21 +505,21 @@ def reduction(
 ) -> ReducedModel:
     """Reduce the case's structure to its interface, with `modes` modes or (None) as many as a tolerance needs.
 
-    spots: places whose stresses are outputs; keep_recovery: keep the basis, by which responses are shown on the mesh;
+    spots: number of hot spots; keep_recovery: keep the basis, which recovers responses on the mesh;
     level: keep the amplitude at the case's fatigue strength, in the model's provenance.
 
-    The estimate of the model's error is in its provenance, too. This
-    covers receptances of the whole interface up to max_frequency, by default 1.5 times the first bending (of most
-    effective mass along the case's direction; of a free structure its first elastic mode). Craig-Bampton models have a
+    The provenance also contains the estimate of the model's error, which
+    covers receptances of the whole interface up to max_frequency, by default 1.5 times the first bending (with most
+    effective mass along the case's direction; for a free structure the first elastic mode). Craig-Bampton models have a
     block of quasi-static modes. A rotating structure is reduced for all speeds up to the maximum of its case, and the
-    number of modes suits standstill and that speed. Raises LadderError when no model of up to _MOST modes meets the
-    tolerance, and InputError for a structure that rotates with another basis, or up to no speed.
+    number of modes suffices at standstill and at that speed. Raises LadderError if no model up to _MOST modes meets the
+    tolerance, and InputError for a rotating structure with another basis, or without a maximum speed.
     """
     greatest = _greatest_speed(structure, basis)
     rotating = structure.rotating_to(greatest) if greatest else None
     levelled = level and structure.case.response_label is not None and bool(structure.case.fatigue_strength)
     recovery = keep_recovery or bool(spots) or levelled
-    found = basis_named(basis)
+    chosen_basis = basis_named(basis)
     coordinates = interface(structure.case, structure.matrices)
     at = structure.case.response_label or coordinates.labels[0]
     most = min(_MOST, structure.matrices.free.size // 4)
@@ -528,10 +528,10 @@ def reduction(
         with stage(f"basis of {asked} modes"):
             if rotating is None:
                 bases = None
-                rich = [found.rich(structure.matrices, coordinates, asked, factorize, 1 + BLOCKS, recovery)]
+                rich = [chosen_basis.rich(structure.matrices, coordinates, asked, factorize, 1 + BLOCKS, recovery)]
             else:
-                assert found.speeds is not None  # as _greatest_speed has checked
-                bases = found.speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
+                assert chosen_basis.speeds is not None  # as _greatest_speed has checked
+                bases = chosen_basis.speeds(rotating, coordinates, asked, factorize, 1 + BLOCKS)
                 rich = [bases.model_at(speed) for speed in (0.0, greatest)]
         with stage("estimate of the error"):
             grids = [_of_interest(model, max_frequency, structure.case) for model in rich]
@@ -546,13 +546,13 @@ def reduction(
     covered = [min(float(grid[0]) for grid in grids), max(float(grid[-1]) for grid in grids)]
     estimate = choice.to_json() | {"frequencies_hz": covered}
     if bases is None:
-        model = found.cut(rich[0], choice.chosen.modes)
+        model = chosen_basis.cut(rich[0], choice.chosen.modes)
     else:
         of_interest = partial(_of_interest, max_frequency=max_frequency, case=structure.case)
         with stage("speeds of rotation"):
             model = reduce_rotating(bases, greatest, choice.chosen.modes, tolerance, of_interest, recovery)
-    made = {"basis": basis, "estimate": estimate, "versions": versions()}
-    model = replace(model, provenance=dict(model.provenance) | made)
+    provenance = {"basis": basis, "estimate": estimate, "versions": versions()}
+    model = replace(model, provenance=dict(model.provenance) | provenance)
     if levelled:
         model = replace(model, provenance=dict(model.provenance) | {"fatigue": _level_of(structure, model, at)})
     if spots:
@@ -561,12 +561,12 @@ def reduction(
 
 
 def reduction_warnings(structure: Structure, model: ReducedModel) -> tuple[str, ...]:
-    """Return what to look at in a reduced model: units, joints, strengths, and stresses that the mesh decides."""
-    made = model.provenance
-    found = unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])) + joint_doubts(structure)
-    if made.get("fatigue") is not None or "hot_spots" in made:
-        found += strength_warnings(structure)
-    return found + tuple(spot_warnings(made))
+    """Return warnings of a reduced model: units, joints, strengths, and stresses that depend on the mesh."""
+    provenance = model.provenance
+    warnings = unit_doubts(structure, float(model.natural_frequencies_hz[model.rigid_modes])) + joint_doubts(structure)
+    if provenance.get("fatigue") is not None or "hot_spots" in provenance:
+        warnings += strength_warnings(structure)
+    return warnings + tuple(spot_warnings(provenance))
 
 
 def _level_of(structure: Structure, model: ReducedModel, at: str) -> dict[str, Any] | None:
@@ -588,7 +588,7 @@ def _level_of(structure: Structure, model: ReducedModel, at: str) -> dict[str, A
 def _greatest_speed(structure: Structure, basis: str) -> float:
     """Return the maximum speed, rad/s, that a reduced model of the structure covers; 0 if it does not rotate.
 
-    Raises InputError for none, or a basis that does not hold over speeds, and UnstableError beyond the stable ones.
+    Raises InputError without a speed, or for a basis that does not cover speeds, and UnstableError for unstable ones.
     """
     table = structure.case.rotation
     if table is None or structure.turning is None:
@@ -606,14 +606,14 @@ def _greatest_speed(structure: Structure, basis: str) -> float:
 
 
 def _of_interest(model: ReducedModel, max_frequency: float | None, case: Case) -> np.ndarray:
-    """Return the frequencies over which the errors of models count, Hz: up to max_frequency, or beyond the mode of
+    """Return the frequencies at which errors of models are evaluated, Hz: up to max_frequency, or above the mode of
     interest."""
     top = max_frequency or _REACH * float(model.natural_frequencies_hz[_mode_of_interest(model, case)])
     return frequency_grid(model, 0.05 * top if model.rigid_modes else 0.0, top)
 
 
 def _mode_of_interest(model: ReducedModel, case: Case) -> int:
-    """Return the index of the first bending among a model's elastic modes; the first of them where none is one."""
+    """Return the index of the first bending among a model's elastic modes; 0 if there is none."""
     first, modes = model.rigid_modes, case.modes.count or MODES
     inertia = model.base_load @ unit_direction(case.modes.direction)
     masses = (model.natural[1].T @ inertia) ** 2

@@ -1,4 +1,4 @@
-"""A case with its finite elements, as every stage takes it."""
+"""A case with its finite elements, the input of every stage."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Structure:
 
     @cached_property
     def rotating(self) -> RotatingMatrices | None:
-        """Matrices of a case that rotates, up to the highest speed that it names. Errors: as `rotating_to`."""
+        """Matrices of a rotating case, up to its highest speed. Raises the errors of `rotating_to`."""
         rotation, diagram = self.case.rotation, self.case.campbell
         if rotation is None or self.turning is None:
             return None
@@ -34,15 +34,17 @@ class Structure:
         return self.rotating_to(highest)
 
     def rotating_to(self, speed: float) -> RotatingMatrices:
-        """Return the matrices of a case that rotates for speeds up to one (rad/s).
+        """Return the matrices of a rotating case for speeds up to the given one (rad/s).
 
         Raises modal.rotating.UnstableError for a speed without a stable equilibrium.
         """
-        given = self.turning
-        assert given is not None
-        if speed == given.greatest:
-            return given
-        return self.solid.rotating(given.standing, given.axis.tolist(), given.point.tolist(), given.statics, speed)
+        rotating = self.turning
+        assert rotating is not None
+        if speed == rotating.greatest:
+            return rotating
+        return self.solid.rotating(
+            rotating.standing, rotating.axis.tolist(), rotating.point.tolist(), rotating.statics, speed
+        )
 
     def mesh(self) -> tuple[dict[str, Variable], int]:
         """Return the nodes and cells of the displacements as variables of a record, and the VTK type of the cells."""

@@ -60,7 +60,7 @@ class MeshFile:
 
     @property
     def foreign(self) -> bool:
-        """Say whether another program than gmsh wrote it."""
+        """Whether the file was written by another program than gmsh."""
         return not self.file.lower().endswith(".msh")
 
     @property
@@ -78,17 +78,17 @@ class _Generated:
     parameters: Any
 
     def build(self, path: str | Path) -> Path:
-        """Write the mesh. Raises what `build` of its generator in meshes raises."""
+        """Write the mesh. Raises the errors of `build` of its generator in meshes."""
         return _BUILD[self.generator](self.parameters, path)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        made = handler(schema)
-        table = handler.resolve_ref_schema(made)
+        json_schema = handler(schema)
+        table = handler.resolve_ref_schema(json_schema)
         parameters = handler.resolve_ref_schema(table["properties"].pop("parameters"))
         table["properties"] |= parameters["properties"]
         table["required"] = [*parameters.get("required", ()), "generator"]
-        return made
+        return json_schema
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -152,12 +152,12 @@ def _gather(table: Any) -> Any:
     """Return the table with a generator's parameters in a table of their own."""
     if not isinstance(table, Mapping) or "generator" not in table:
         return table
-    own = {key: table[key] for key in ("generator", "degree") if key in table}
-    parameters = {key: value for key, value in table.items() if key not in own}
+    common = {key: table[key] for key in ("generator", "degree") if key in table}
+    parameters = {key: value for key, value in table.items() if key not in common}
     for key, value in parameters.items():
-        if isinstance(value, str):  # the generators' records would take "3" for 3
+        if isinstance(value, str):  # the generators' records would convert "3" to 3
             raise ValueError(f"{key}: expected a number, not {value!r}")
-    return own | {"parameters": parameters}
+    return common | {"parameters": parameters}
 
 
 Mesh = Annotated[
@@ -226,13 +226,13 @@ def _kind_of_material(table: Any) -> str:
 
 
 def without_strengths(materials: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables below [material] of a case without fatigue strengths and fatigue data."""
-    kept = {name: dict(table) for name, table in materials.items() if _kind_of_material(table) == "material"}
-    return {name: {key: kept[name][key] for key in kept[name] if not key.startswith("fatigue")} for name in kept}
+    """Return the tables of [material] without fatigue strengths and fatigue data."""
+    plain = {name: dict(table) for name, table in materials.items() if _kind_of_material(table) == "material"}
+    return {name: {key: plain[name][key] for key in plain[name] if not key.startswith("fatigue")} for name in plain}
 
 
 def _one_kind(table: Any) -> Any:
-    """Reject a table that is a material and fatigue data."""
+    """Reject a table that mixes a material and fatigue data."""
     if isinstance(table, Mapping) and table.keys() & _MATERIAL_KEYS and (stray := table.keys() & _FATIGUE_KEYS):
         raise ValueError(f"{min(stray)}: is fatigue data; head it [material.<group>.fatigue]")
     return table
@@ -265,7 +265,7 @@ def _least_strength(materials: Mapping[str, MaterialTable]) -> float | None:
 
 
 def _with_fatigue(schema: dict[str, Any]) -> None:
-    """Let the schema of [material] have [material.fatigue] as a table of its own, and materials under other names."""
+    """Let the schema of [material] accept [material.fatigue] as fatigue data, and materials under other names."""
     material, fatigue = schema["additionalProperties"]["oneOf"]
     schema |= {"properties": {"fatigue": fatigue}, "additionalProperties": material}
 
@@ -275,7 +275,7 @@ _Material = Annotated[
     Discriminator(_kind_of_material),
     BeforeValidator(_one_kind),
 ]
-#: below [material]: the materials, and fatigue data for all of them, of which `_spread` leaves the former
+#: tables of [material]: materials, and fatigue data for all of them, which `_spread` merges into the former
 _Materials = Annotated[
     dict[
         str,
@@ -286,7 +286,7 @@ _Materials = Annotated[
 ]
 
 
-#: facet groups with the components that are held
+#: facet groups with their fixed components
 _Components = dict[str, Annotated[str, Field(pattern="^[xyz]+$")]]
 _Clamped = _Components | list[str | _Components]
 
@@ -423,8 +423,8 @@ class InterfaceTable:
     @property
     def guides(self) -> dict[str, str]:
         """The facet groups that give directions, by key."""
-        given = {"direction": self.direction, "normal": self.normal}
-        return {key: group for key, group in given.items() if isinstance(group, str) and group != "normal"}
+        directions = {"direction": self.direction, "normal": self.normal}
+        return {key: group for key, group in directions.items() if isinstance(group, str) and group != "normal"}
 
 
 @documented
@@ -458,8 +458,8 @@ class Case:
     """deviations of the sectors of the ring"""
 
     def __post_init__(self) -> None:
-        given = {table.damping_ratio for table in self.material.values()} - {None}
-        if self.modes.damping_ratio is None and len(given) > 1:
+        ratios = {table.damping_ratio for table in self.material.values()} - {None}
+        if self.modes.damping_ratio is None and len(ratios) > 1:
             raise ValueError("material: the damping ratios differ; set the one of the modes in [modes] damping_ratio")
         at, labels = self.modes.at, list(self.interface)
         if at is not None and at not in labels:
@@ -535,15 +535,15 @@ class Case:
         return {name: (table.own_strength if table else None) or least for name, table in tables.items()}
 
     def without_strength(self, volumes: Iterable[str]) -> list[str]:
-        """Return the volume groups for which the least strength of the others counts; none without any strength."""
+        """Return the volume groups that use the lowest strength of the others; none if there is no strength."""
         tables = {name: self.material.get(name, self.material.get("default")) for name in volumes}
-        known = self.fatigue_strength is not None
-        return [name for name, table in tables.items() if known and (table is None or table.own_strength is None)]
+        rated = self.fatigue_strength is not None
+        return [name for name, table in tables.items() if rated and (table is None or table.own_strength is None)]
 
     def fatigue(self, volume: str) -> Fatigue | None:
         """Return the complete fatigue data of a volume group's material; None without any.
 
-        Without a fatigue strength of its own the material has the least of all (`strengths`).
+        A material without a fatigue strength uses the lowest of all (`strengths`).
         """
         table = self.material.get(volume, self.material.get("default"))
         return None if table is None else table.fatigue_data(self.fatigue_strength)
@@ -552,7 +552,7 @@ class Case:
     def response_label(self) -> str | None:
         """The interface coordinate of the rigid model: the one named, the only one, or `shroud`.
 
-        None without any interface. Raises InputError when the choice is open.
+        None without any interface. Raises InputError if the choice is ambiguous.
         """
         if self.modes.at is not None or not self.interface:
             return self.modes.at
@@ -569,7 +569,7 @@ class Case:
 
     @property
     def volume_groups(self) -> set[str]:
-        """Every group of volumes that materials and the ring name; "unnamed" are the elements outside of them."""
+        """Every volume group that materials and the ring name; "unnamed": the elements outside all groups."""
         return {*self.material, *(self.ring.deviating if self.ring is not None else ())} - {"default", "unnamed"}
 
     def check_groups(
@@ -577,12 +577,14 @@ class Case:
     ) -> None:
         """Raise InputError for a group that the mesh does not have; lower: kind ("edge", "point") -> groups."""
         surfaces = {"facet": list(facets)}
-        known = surfaces | {kind: list(names) for kind, names in (lower or {}).items()}
+        groups = surfaces | {kind: list(names) for kind, names in (lower or {}).items()}
         for group in self.support.clamped:
-            _check_group("support.clamped", group, known)
+            _check_group("support.clamped", group, groups)
         for group in self.hot_spots.exclude:
-            _check_group("hot_spots.exclude", group, known)
-        mixed = {group for group in surfaces["facet"] if any(group in known[kind] for kind in known if kind != "facet")}
+            _check_group("hot_spots.exclude", group, groups)
+        mixed = {
+            group for group in surfaces["facet"] if any(group in groups[kind] for kind in groups if kind != "facet")
+        }
         for group in self.support.elastic:
             _check_group(f"support.elastic.{group}", group, surfaces)
             if group in mixed:
@@ -592,9 +594,9 @@ class Case:
                 )
         for label, table in self.interface.items():
             for group in table.groups:
-                _check_group(f"interface.{label}.facets", group, known)
-            # a facet group weighs its nodes by area, others each by one
-            kinds = [kind for kind, names in known.items() if set(table.groups) & set(names)]
+                _check_group(f"interface.{label}.facets", group, groups)
+            # facet groups weight their nodes by area, other groups equally
+            kinds = [kind for kind, names in groups.items() if set(table.groups) & set(names)]
             if "facet" in kinds and len(kinds) > 1:
                 raise InputError(
                     f"interface.{label}.facets: groups of several kinds ({', '.join(sorted(kinds))}), whose nodes have "
@@ -627,7 +629,7 @@ def check_interface(case: Case) -> None:
 
 
 def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -> None:
-    """Raise ValueError for materials that no temperature changes, and for two moduli at the reference temperature."""
+    """Raise ValueError if no material depends on temperature, or if moduli at the reference temperature contradict."""
     if not any(table.expansion or table.young_at for table in materials.values()):
         raise ValueError("temperature: changes nothing; give a material its expansion (1/K) or young_at")
     for group, table in materials.items():
@@ -638,15 +640,15 @@ def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -
             raise ValueError(
                 f"material.{group}.young_at: holds from {low:g} to {high:g}, without the reference {reference:g}"
             )
-        given = float(np.interp(reference, *np.transpose(table.young_at)))
-        if abs(given / table.young - 1.0) > _SAME_MODULUS:
+        modulus = float(np.interp(reference, *np.transpose(table.young_at)))
+        if abs(modulus / table.young - 1.0) > _SAME_MODULUS:
             raise ValueError(
-                f"material.{group}.young: is the modulus at the reference temperature, {given:.6g} Pa by young_at"
+                f"material.{group}.young: is the modulus at the reference temperature, {modulus:.6g} Pa by young_at"
             )
 
 
 def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) -> None:
-    """Take a file that a key names relative to the case, and see that it is there."""
+    """Resolve a file name relative to the case, and check that the file exists."""
     table: Any = data
     for key in keys[:-1]:
         table = table.get(key) if isinstance(table, dict) else None
@@ -659,34 +661,34 @@ def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) ->
 
 
 def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
-    """Reject mesh tables in words that their union of records does not have."""
+    """Reject wrong mesh tables with clearer messages than those of the union of records."""
     generator, file = mesh.get("generator"), mesh.get("file")
     if (generator is None) == (file is None):
         raise InputError(f"{path}: mesh: give one of file and generator")
-    known = ["file", "degree", "scale"]
+    keys = ["file", "degree", "scale"]
     if generator is not None:
         if str(generator) not in GENERATORS:
             raise InputError(
                 f"{path}: mesh.generator: no generator {generator!r}; {nearest(str(generator), list(GENERATORS))}"
             )
-        known = ["generator", "degree", *_names(GENERATORS[str(generator)])]
+        keys = ["generator", "degree", *_names(GENERATORS[str(generator)])]
     for key in mesh:
         owners = [f'generator = "{name}"' for name, record in GENERATORS.items() if key in _names(record)]
-        if key not in known and generator is None and owners:
+        if key not in keys and generator is None and owners:
             raise InputError(f"{path}: mesh.{key}: belongs to {' or '.join(owners)}, not to a file")
-        if key not in known:
-            raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, known)}")
+        if key not in keys:
+            raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, keys)}")
 
 
 def _names(record: Any) -> list[str]:
     return [item.name for item in fields(record)]
 
 
-def _check_group(key: str, group: str, known: Mapping[str, list[str]]) -> None:
+def _check_group(key: str, group: str, by_kind: Mapping[str, list[str]]) -> None:
     """Raise InputError for an unknown group, by kind; the first kind is the usual one."""
-    if any(group in names for names in known.values()):
+    if any(group in names for names in by_kind.values()):
         return
-    (kind, names), *others = known.items()
+    (kind, names), *others = by_kind.items()
     elsewhere = "".join(f"; {other} groups: {', '.join(sorted(groups))}" for other, groups in others if groups)
     raise InputError(
         f"{key}: no {kind} group '{group}' in the mesh; it has {', '.join(sorted(names)) or 'none'}{elsewhere}"

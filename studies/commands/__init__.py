@@ -8,8 +8,8 @@ A command is a module, or an object, with
     NAME                    if it is not the file's
     ORDER                   place in --help: the steps of the pipeline count up
 
-Ours are `support.declaration.Command`: what they take, read and write, and the name of the function that does it. Each
-has a file of its own here, which is imported when the command runs. What several commands need is in `support/`.
+Our own are of `support.declaration.Command`: arguments, input, output, and the name of the function that runs. Each
+has a file in this folder, which is imported when the command runs. `support/` has code for several commands.
 """
 
 from __future__ import annotations

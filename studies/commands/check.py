@@ -1,4 +1,4 @@
-"""`vanedamp check`: what an input file means, without running it."""
+"""`vanedamp check`: explain an input file without running it."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ def run(arguments: Namespace) -> None:
     """Print the facts."""
     tables = read_toml(arguments.input)
     kind = kind_of(tables, arguments.input)
-    found = import_module(f"{facts.__name__}.{kind.name}").facts(arguments.input)
-    left = facts.defaults(kind, tables)
-    places = next((fact.value for fact in found if fact.key == "positions"), ())
-    bodies = zip(tables.get("damper", ()), places, strict=False)
-    left |= {f"damper.{number}.position": at for number, (body, at) in enumerate(bodies) if "position" not in body}
-    result = {"kind": kind.name} | {fact.key: fact.value for fact in found} | {"defaults": left}
-    commands = ", ".join(found[0].value) or "nothing as it is"
-    lines = list(fact_lines(f"{arguments.input}: {a(kind)}, for vanedamp {commands}", found[1:]))
-    if left:
-        named = ", ".join(f"{key} = {word(value)}" for key, value in left.items())
+    file_facts = import_module(f"{facts.__name__}.{kind.name}").facts(arguments.input)
+    defaults = facts.defaults(kind, tables)
+    positions = next((fact.value for fact in file_facts if fact.key == "positions"), ())
+    bodies = zip(tables.get("damper", ()), positions, strict=False)
+    defaults |= {f"damper.{number}.position": at for number, (body, at) in enumerate(bodies) if "position" not in body}
+    result = {"kind": kind.name} | {fact.key: fact.value for fact in file_facts} | {"defaults": defaults}
+    commands = ", ".join(file_facts[0].value) or "nothing as it is"
+    lines = list(fact_lines(f"{arguments.input}: {a(kind)}, for vanedamp {commands}", file_facts[1:]))
+    if defaults:
+        named = ", ".join(f"{key} = {word(value)}" for key, value in defaults.items())
         lines.append(f"left at their defaults: {named}")
     write_result(arguments, result, lines)

@@ -13,7 +13,7 @@ from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.messages import write_result
 
-#: columns that are printed, and the rows of these
+#: columns that are printed, and number of their rows
 _SHOWN = ("speed", "force", "duration", "pressure", "stiffness_force", "stiffness_duration", "restitution_thornton")
 _EVERY = 4
 
@@ -23,13 +23,13 @@ def run(arguments: Namespace) -> None:
     speeds = None if arguments.speeds is None else tuple(arguments.speeds)
     if speeds is not None and not speeds[0] < speeds[1]:
         raise InputError(f"--speeds: expected the lower one first, not {speeds[0]:g} {speeds[1]:g}")
-    found = contact(arguments.input, speeds=speeds, preload=arguments.preload)
-    if (arguments.output or arguments.picture) and not found[0].columns:
+    contacts = contact(arguments.input, speeds=speeds, preload=arguments.preload)
+    if (arguments.output or arguments.picture) and not contacts[0].columns:
         raise InputError(f"{arguments.input}: a flat face has no table over the speed; leave -o and --picture out")
     write_result(
-        arguments, {"contacts": [numbers.to_json() for numbers in found]},
-        (line for numbers in found for line in (*_lines(numbers), "")),
-        output=lambda path: _write_table(Path(path), found), picture=lambda path: _draw(Path(path), found),
+        arguments, {"contacts": [numbers.to_json() for numbers in contacts]},
+        (line for numbers in contacts for line in (*_lines(numbers), "")),
+        output=lambda path: _write_table(Path(path), contacts), picture=lambda path: _draw(Path(path), contacts),
     )  # fmt: skip
 
 
@@ -66,25 +66,25 @@ def _range(ends: tuple[float, float]) -> str:
     return f"{ends[0]:g}" if ends[0] == ends[1] else f"{ends[0]:g} to {ends[1]:g}"
 
 
-def _write_table(path: Path, found: tuple[ContactNumbers, ...]) -> None:
+def _write_table(path: Path, contacts: tuple[ContactNumbers, ...]) -> None:
     """Write the columns of all contacts as CSV, with units in the heading."""
-    names = list(found[0].columns)
+    names = list(contacts[0].columns)
     heading = ",".join(["contact", *(f"{name} [{UNITS.get(name, '-')}]" for name in names)])
     rows = [
         ",".join([numbers.name, *(f"{numbers.columns[name][row]:.9g}" for name in names)])
-        for numbers in found
+        for numbers in contacts
         for row in range(len(numbers.columns["speed"]))
     ]
     with replacing(path) as temporary:
         temporary.write_text("\n".join([heading, *rows, ""]), encoding="utf-8")
 
 
-def _draw(path: Path, found: tuple[ContactNumbers, ...]) -> None:
+def _draw(path: Path, contacts: tuple[ContactNumbers, ...]) -> None:
     """Draw restitution, or without a yield strength duration, and force over the speed."""
     from vanedamp.studies.figures import BLUE, GOLD, GREEN, RED, draw_grid, save, subplots
 
     figure, (left, right) = subplots(1, 2, size=(10.0, 4.0))
-    for numbers, style in zip(found, ("-", "--", ":", "-.") * len(found), strict=False):
+    for numbers, style in zip(contacts, ("-", "--", ":", "-.") * len(contacts), strict=False):
         columns, speed = numbers.columns, numbers.columns["speed"]
         left.loglog(speed, columns["force"], style, color=BLUE, label=numbers.name)
         for model, colour in zip(numbers.models, (RED, GREEN), strict=False):
@@ -97,8 +97,8 @@ def _draw(path: Path, found: tuple[ContactNumbers, ...]) -> None:
             for axes in (left, right):
                 axes.axvline(numbers.yield_speed, color=GOLD, linestyle=style, linewidth=0.8)
     left.set(xlabel="speed of approach, m/s", ylabel="largest force, N")
-    right.set(xlabel="speed of approach, m/s", ylabel="restitution" if found[0].models else "duration, s")
-    if found[0].models:
+    right.set(xlabel="speed of approach, m/s", ylabel="restitution" if contacts[0].models else "duration, s")
+    if contacts[0].models:
         right.set_ylim(0.0, 1.05)
     for axes in (left, right):
         axes.legend(frameon=False)

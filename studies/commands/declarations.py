@@ -1,4 +1,4 @@
-"""Our own commands: what each takes, reads and writes, and in which order `--help` names them.
+"""Our own commands: arguments, input and output of each, in the order of `--help`.
 
 Nothing heavy is imported here, since `vanedamp --help` reads all of it.
 """

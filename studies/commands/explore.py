@@ -10,7 +10,7 @@ from pathlib import Path
 from vanedamp.files.store import kind_of
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.messages import print_note
-from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
+from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, FigureStructure
 from vanedamp.studies.explore.page import Exploration
 from vanedamp.studies.explore.server import has_display, serve
 from vanedamp.studies.explore.sweep_files import open_sweeps
@@ -61,7 +61,7 @@ def _show_rings(arguments: Namespace) -> None:
 def _exploration(source: Path | None, arguments: Namespace) -> Exploration:
     """Return the exploration of a scene's file, or of the shipped rigid model. Raises InputError."""
     if source is None:
-        figure = FigureScenes.load(FOLDER / "fig9.toml", Structure.shipped())
+        figure = FigureScenes.load(FOLDER / "fig9.toml", FigureStructure.shipped())
         scene, name = figure.scenes[""].replace({"sweep": {}}), "rigid model of the shipped cluster"
     else:
         scene, name = load_scene(source), str(source)

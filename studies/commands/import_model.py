@@ -1,4 +1,4 @@
-"""`vanedamp import`: a reduced model of another code, checked and kept as one of ours."""
+"""`vanedamp import`: check a reduced model of another code and save it as a reduced model."""
 
 from __future__ import annotations
 

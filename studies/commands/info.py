@@ -1,4 +1,4 @@
-"""`vanedamp info`: what a result is, how it was made, and its main figures."""
+"""`vanedamp info`: kind and origin of a result, and its main values."""
 
 from __future__ import annotations
 
@@ -22,53 +22,53 @@ _CHECKPOINT = "-checkpoint"
 
 
 def run(arguments: Namespace) -> None:
-    """Print the facts. Raises StoreError for a file that is no record of ours, or damaged."""
+    """Print the facts. Raises StoreError for a damaged file, or one that vanedamp did not write."""
     path = arguments.input
     kind, variables, attributes = load_any(path)
     checkpoint = kind.endswith(_CHECKPOINT)
-    known = kinds.of_command(kind.removesuffix(_CHECKPOINT)) if checkpoint else kinds.kind(kind)
-    about = kind if known is None else known.ABOUT
+    module = kinds.of_command(kind.removesuffix(_CHECKPOINT)) if checkpoint else kinds.kind(kind)
+    about = kind if module is None else module.ABOUT
     what = f"what {about} had finished" if checkpoint else about
     with decoding(path):
         record = Found(path, variables, {name: _nested(value) for name, value in attributes.items()})
-        found = [
-            Fact("command", f"vanedamp {' or '.join(known.COMMANDS)}" if known and known.COMMANDS else None),
-            Fact("record", known and known.RECORD, "", "in Python"),
+        facts = [
+            Fact("command", f"vanedamp {' or '.join(module.COMMANDS)}" if module and module.COMMANDS else None),
+            Fact("record", module and module.RECORD, "", "in Python"),
             *_origin(record),
         ]
-        found += (
+        facts += (
             [Fact("finished", record.attributes.get("finished"))]
             if checkpoint
-            else (known.facts if known else plain_facts)(record)
+            else (module.facts if module else plain_facts)(record)
         )
-        found += [Fact("sizes", {} if checkpoint else _sizes(variables)), Fact("warnings", _warnings(record))]
-        result = {"kind": kind} | {fact.key: fact.value for fact in found} | {"scene": _scene(record)}
-        lines = list(fact_lines(f"{path}: {kind}, {what}", found))
-        json_text(finite(result))  # values of no type that a record of ours has
+        facts += [Fact("sizes", {} if checkpoint else _sizes(variables)), Fact("warnings", _warnings(record))]
+        result = {"kind": kind} | {fact.key: fact.value for fact in facts} | {"scene": _scene(record)}
+        lines = list(fact_lines(f"{path}: {kind}, {what}", facts))
+        json_text(finite(result))  # fails for types that our records do not contain
     write_result(arguments, result, lines)
 
 
 def _nested(value: Any) -> Any:
-    """Return nested data of its JSON text; any other value as it is."""
+    """Return the data of a JSON text; any other value unchanged."""
     if isinstance(value, str) and value[:1] in "{[":
         try:
             return json.loads(value)
-        except ValueError:  # a text that begins like that
+        except ValueError:  # a text that only begins like JSON
             return value
     return value
 
 
 def _origin(record: Found) -> Iterator[Fact]:
-    """Yield when, by which software and from what input the file was made."""
+    """Yield date, software and input of the file."""
     path, attributes = Path(record.path), record.attributes
-    made = attributes.get("provenance", {})
-    matrices = made.get("matrices", attributes.get("matrices"))
-    matrices = matrices if isinstance(matrices, dict) else made  # of an imported model: their names
+    provenance = attributes.get("provenance", {})
+    matrices = provenance.get("matrices", attributes.get("matrices"))
+    matrices = matrices if isinstance(matrices, dict) else provenance  # of an imported model: their names
     written = datetime.fromtimestamp(path.stat().st_mtime).astimezone()
     yield Fact(
         "written", written.isoformat(" ", "seconds"), "", f"time of the file, {path.stat().st_size / 1e6:.3g} MB"
     )
-    versions = matrices.get("versions", {}) | made.get("versions", {}) | attributes.get("versions", {})
+    versions = matrices.get("versions", {}) | provenance.get("versions", {}) | attributes.get("versions", {})
     yield Fact("versions", versions)
     if "mesh" in matrices:
         yield Fact("mesh", {"file": matrices["mesh"], "sha256": matrices["mesh_sha256"]})
@@ -81,9 +81,9 @@ def _origin(record: Found) -> Iterator[Fact]:
 
 def _scene(record: Found) -> dict[str, Any] | None:
     """Return the scene in a file, as plain data; None without."""
-    of_study, made = record.attributes.get("study", {}), record.attributes.get("provenance", {})
-    found: dict[str, Any] | None = record.attributes.get("scene") or of_study.get("scene") or made.get("scene")
-    return found
+    of_study, provenance = record.attributes.get("study", {}), record.attributes.get("provenance", {})
+    scene: dict[str, Any] | None = record.attributes.get("scene") or of_study.get("scene") or provenance.get("scene")
+    return scene
 
 
 def _sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
@@ -96,5 +96,5 @@ def _sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
 
 
 def _warnings(record: Found) -> list[str]:
-    found = record.attributes.get("warnings") or record.attributes.get("provenance", {}).get("warnings", [])
-    return list(found)
+    warnings = record.attributes.get("warnings") or record.attributes.get("provenance", {}).get("warnings", [])
+    return list(warnings)

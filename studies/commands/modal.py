@@ -16,7 +16,7 @@ from vanedamp.studies.hot_spots import plus_minus
 
 
 def run(arguments: Namespace, case: Case) -> None:
-    """Compute the modes, and what follows from them."""
+    """Compute the modes and the results derived from them."""
     if arguments.solver is not None:
         case = replace(case, modes=replace(case.modes, solver=arguments.solver))
     analysis = modal_analysis(assemble(case))
@@ -43,10 +43,10 @@ def _summary(result: Mapping[str, Any]) -> Iterator[str]:
         )
         yield from cavity_lines(result)
     if "gyroscopic" in result:
-        found = result["gyroscopic"]
+        whirl = result["gyroscopic"]
         yield "with the gyroscopic coupling, in the rotating frame (whirl 1: with the rotation, -1: against it):"
         yield "mode  frequency/Hz      whirl   residual"
-        for index, row in enumerate(zip(found["frequency_hz"], found["whirl"], found["residual"], strict=True)):
+        for index, row in enumerate(zip(whirl["frequency_hz"], whirl["whirl"], whirl["residual"], strict=True)):
             yield "{:4}  {:12.2f}   {:8.4f}   {:.1e}".format(index + 1, *row)
     if "fatigue" in result:
         fatigue = result["fatigue"]

@@ -1,4 +1,4 @@
-"""`vanedamp pipeline`: from a case to a report in one command, which redoes only what changed."""
+"""`vanedamp pipeline`: from a case to a report in one command, which repeats only stages with changed inputs."""
 
 from __future__ import annotations
 

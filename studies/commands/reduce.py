@@ -97,8 +97,8 @@ def _ring_summary(ring: RingModel | SectorRing) -> Iterator[str]:
     if ring.greatest_speed:
         yield f"for speeds up to {ring.greatest_speed:.6g} rad/s; at standstill:"
     for number in range(ring.sectors // 2 + 1):
-        own = np.unique(ring.frequencies_hz[ring.diameters[: ring.modes] == number])
-        yield f"nodal diameter {number}, Hz: " + _listed(own, estimate)
+        frequencies = np.unique(ring.frequencies_hz[ring.diameters[: ring.modes] == number])
+        yield f"nodal diameter {number}, Hz: " + _listed(frequencies, estimate)
 
 
 def _summary(model: ReducedModel, fastest: ReducedModel) -> Iterator[str]:

@@ -10,7 +10,7 @@ from vanedamp.studies.file_kinds import KINDS
 
 
 def add_kind(parser: ArgumentParser) -> None:
-    """Take a kind of files."""
+    """Declare the kind of file."""
     parser.add_argument("kind", metavar="KIND", choices=sorted(KINDS), help=", ".join(sorted(KINDS)))
 
 

@@ -1,1 +1,1 @@
-"""The demonstration: scenes in units of the shipped structure, their sweeps as studies with pictures and claims."""
+"""The demonstration: scenes in units of the shipped structure, and their sweeps with pictures and claims."""

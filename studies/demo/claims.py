@@ -1,4 +1,4 @@
-"""The claims that the demonstration judges, and how: rules on results, in words of our own.
+"""The claims that the demonstration tests: rules on results, in our own words.
 
 Where a claim holds in part or not, `why` names the cause in the model. Amplitudes are relative to the undamped
 maximum.
@@ -11,10 +11,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.report.claims import Claim
 
-Curves = Mapping[str, list[Curve]]
+Curves = Mapping[str, list[DampedCurve]]
 #: reductions that differ by less are the same
 _SLACK = 0.02
 SHOWN, PARTLY, NOT_SHOWN = "shown", "partly", "not shown"
@@ -112,31 +112,34 @@ def fig12(curves: Curves) -> list[Claim]:
     ]
 
 
-def _level(reduced: Curve, rigid: Curve) -> Claim:
-    top, other = reduced.peak(), rigid.peak()
+def _level(reduced: DampedCurve, rigid: DampedCurve) -> Claim:
+    top, rigid_top = reduced.peak(), rigid.peak()
     return claim(
         "The averaged amplitudes of both models agree, at about half of the maximum without bodies.",
-        f"highest means: reduced model {top}, rigid model {other}",
-        verdict(abs(top.height - other.height) < 0.1 and 0.35 < top.height < 0.6, abs(top.height - other.height) < 0.2),
-        figures={"reduced": top.height, "rigid": other.height, "confidence": top.confidence},
+        f"highest means: reduced model {top}, rigid model {rigid_top}",
+        verdict(
+            abs(top.height - rigid_top.height) < 0.1 and 0.35 < top.height < 0.6,
+            abs(top.height - rigid_top.height) < 0.2,
+        ),
+        figures={"reduced": top.height, "rigid": rigid_top.height, "confidence": top.confidence},
     )
 
 
-def onset(curve: Curve) -> Claim:
-    found = [_onset(start, each) for start, each in curve.each or (("", curve),)]
-    shown = [apart < 0.01 and points > 5 for _, apart, points in found]
+def onset(curve: DampedCurve) -> Claim:
+    onsets = [_onset(start, single) for start, single in curve.each or (("", curve),)]
+    shown = [apart < 0.01 and points > 5 for _, apart, points in onsets]
     return claim(
         "Up to an onset the damped curve is the one without bodies.",
-        "; ".join(text for text, _, _ in found),
+        "; ".join(text for text, _, _ in onsets),
         verdict(all(shown), any(shown)),
         "The runs begin at rest: their transient brings the body to the walls, and it goes on flying. A motion that "
         "grows slowly hits only from amplitudes of about half of the gap on. A body that hits as the frequency goes "
         "down goes on hitting below the onset.",
-        {"onset_hz": (curve.each[0][1] if curve.each else curve).onset, "difference": found[0][1]},
+        {"onset_hz": (curve.each[0][1] if curve.each else curve).onset, "difference": onsets[0][1]},
     )
 
 
-def _onset(start: str, curve: Curve) -> tuple[str, float, int]:
+def _onset(start: str, curve: DampedCurve) -> tuple[str, float, int]:
     """Return an onset in words, and by how much the curves differ below it, over how many points."""
     below = curve.frequency < curve.onset
     of = f"{start}: " if start else ""
@@ -151,25 +154,25 @@ def _onset(start: str, curve: Curve) -> tuple[str, float, int]:
     )
 
 
-def drop(curve: Curve) -> Claim:
+def drop(curve: DampedCurve) -> Claim:
     above = (curve.frequency > curve.peak().frequency) & curve.touched
     ratio = curve.smooth[above] / curve.fixed[above]
     low, median, high = (float(np.quantile(ratio, share)) for share in (0.0, 0.5, 1.0))
     at = curve.peak(curve.undamped).index
-    left, fixed = float(curve.mean[at]), float(curve.fixed[at])
+    level, fixed = float(curve.mean[at]), float(curve.fixed[at])
     return claim(
         "Above its peak the damped curve drops to that of the fixed body.",
-        f"at the undamped resonance {left:.3f} is left (fixed body: {fixed:.3f}); above the peak, wherever the body "
+        f"at the undamped resonance {level:.3f} is left (fixed body: {fixed:.3f}); above the peak, wherever the body "
         f"is touched, the smoothed mean is {low:.2f} to {high:.2f} times the fixed curve, in the median {median:.2f}",
         verdict(0.9 < median < 1.1 and high < 1.2, median < 1.1),
         "It drops through the fixed curve: the impacts not only attach mass, they take energy as well, the more the "
         "wider the gap (reference/10 stays close to the fixed curve). Farther up they end, and a body at rest in "
         "the middle leaves the curve without bodies.",
-        {"at_resonance": left, "ratio_low": low, "ratio_median": median, "ratio_high": high},
+        {"at_resonance": level, "ratio_low": low, "ratio_median": median, "ratio_high": high},
     )
 
 
-def resonance_shift(curve: Curve) -> Claim:
+def resonance_shift(curve: DampedCurve) -> Claim:
     top, fixed, free = curve.peak(), curve.peak(curve.fixed), curve.peak(curve.undamped)
     attached = float(curve.attached[top.index])
     share = (free.frequency / fixed.frequency) ** 2 - 1  # the body's mass over the structure's, as its floor feels it
@@ -194,7 +197,7 @@ def resonance_shift(curve: Curve) -> Claim:
     )
 
 
-def _scatter(reduced: Curve, rigid: Curve) -> Claim:
+def _scatter(reduced: DampedCurve, rigid: DampedCurve) -> Claim:
     mine, other = reduced.scatter, rigid.scatter
     return claim(
         "Averages of the reduced model scatter less than maxima of the rigid model.",

@@ -1,4 +1,4 @@
-"""A damped curve over frequencies as claims read it: smoothed means, maxima, scatter, onset."""
+"""A damped curve versus frequency, evaluated for claims: smoothed means, maxima, scatter, onset."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from vanedamp.studies.report.forced_response import ForcedResponse, forced_respo
 
 #: standard deviation of the smoothing, in points: frequencies are denser where the curves are steeper
 _SMOOTHING = 1.5
-#: a damped response within this fraction of the one without bodies has not been touched by the bodies
+#: below this relative difference from the curve without bodies, bodies count as not involved
 _UNTOUCHED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Peak:
+class CurvePeak:
     """Peak of a curve: frequency (Hz), height over the undamped maximum with 95 % confidence, index of the point.
 
     start: of the run there, in words, where there were several.
@@ -36,7 +36,7 @@ class Peak:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class DampedCurve:
     """Arrays (n,) over ascending frequencies (Hz); amplitudes relative to the maximum without bodies X.
 
     X (m, `reference`) is the resonance's, as the paper has it, whether or not the frequencies reach it; where the scene
@@ -49,8 +49,8 @@ class Curve:
     undamped, fixed            linear curves without bodies and with all fixed
     attached, impacts          attached mass fraction and impacts per period
     periodic                   whether the response repeats
-    starts                     of the runs, in words; empty where there was one
-    each                       the curves of all starts by these words, of which this is the worst; else empty
+    starts                     of the runs, in words; empty for a single start
+    each                       the curves of all starts by these words, if this is the worst of them; else empty
     """
 
     name: str
@@ -66,7 +66,7 @@ class Curve:
     periodic: np.ndarray
     reference: float
     starts: tuple[str, ...] = ()
-    each: tuple[tuple[str, Curve], ...] = ()
+    each: tuple[tuple[str, DampedCurve], ...] = ()
 
     @property
     def smooth(self) -> np.ndarray:
@@ -90,7 +90,7 @@ class Curve:
 
     @property
     def scatter(self) -> dict[str, float]:
-        """Root mean square distance of maxima and means from their smoothed curves where there are impacts."""
+        """Root mean square distance of maxima and means from their smoothed curves at points with impacts."""
         hit = self.impacts > 0
         if not hit.any():
             return {"largest": 0.0, "mean": 0.0}
@@ -98,15 +98,15 @@ class Curve:
         distance = {name: values - gaussian_filter1d(values, _SMOOTHING) for name, values in curves.items()}
         return {name: float(np.sqrt(np.mean(values[hit] ** 2))) for name, values in distance.items()}
 
-    def peak(self, values: np.ndarray | None = None) -> Peak:
+    def peak(self, values: np.ndarray | None = None) -> CurvePeak:
         """Return the peak of a curve (n,), by default of the means."""
         values = self.mean if values is None else values
         top = int(np.argmax(values))
         start = self.starts[top] if self.starts else ""
-        return Peak(float(self.frequency[top]), float(values[top]), float(self.confidence[top]), top, start)
+        return CurvePeak(float(self.frequency[top]), float(values[top]), float(self.confidence[top]), top, start)
 
 
-def curves(sweep: Sweep, name: str) -> list[Curve]:
+def curves(sweep: Sweep, name: str) -> list[DampedCurve]:
     """Return a curve for every combination of the axes before the last, the frequency; without points not ok.
 
     Along an engine order the last axis is the speed, and the frequency the excitation's.
@@ -121,7 +121,7 @@ def curves(sweep: Sweep, name: str) -> list[Curve]:
     ]
 
 
-def worst_of(curves: Sequence[Curve], words: Sequence[str]) -> Curve:
+def worst_of(curves: Sequence[DampedCurve], words: Sequence[str]) -> DampedCurve:
     """Return the curve that has, at each frequency, the run with the highest mean, and the largest amplitude of all.
 
     words: how the runs of each curve begin. A frequency at which no run is ok is left out.
@@ -129,27 +129,27 @@ def worst_of(curves: Sequence[Curve], words: Sequence[str]) -> Curve:
     frequency = np.unique(np.concatenate([curve.frequency for curve in curves]))
     shown = [np.isin(frequency, curve.frequency) for curve in curves]
     whole: dict[str, np.ndarray] = {}
-    for name in (item.name for item in fields(Curve) if isinstance(getattr(curves[0], item.name), np.ndarray)):
+    for name in (item.name for item in fields(DampedCurve) if isinstance(getattr(curves[0], item.name), np.ndarray)):
         whole[name] = np.full((len(curves), len(frequency)), -np.inf if name in ("mean", "largest") else 0.0)
         for row, (curve, at) in enumerate(zip(curves, shown, strict=True)):
             whole[name][row, at] = getattr(curve, name)
     worst = whole["mean"].argmax(axis=0)
-    found = {name: values[worst, np.arange(len(frequency))] for name, values in whole.items()}
-    found |= {"largest": whole["largest"].max(axis=0), "periodic": found["periodic"] == 1.0}
+    arrays = {name: values[worst, np.arange(len(frequency))] for name, values in whole.items()}
+    arrays |= {"largest": whole["largest"].max(axis=0), "periodic": arrays["periodic"] == 1.0}
     return replace(
-        curves[0], **found, starts=tuple(words[row] for row in worst), each=tuple(zip(words, curves, strict=True))
+        curves[0], **arrays, starts=tuple(words[row] for row in worst), each=tuple(zip(words, curves, strict=True))
     )
 
 
 def _curve(
     response: ForcedResponse, confidence: np.ndarray, harmonic: np.ndarray, classification: np.ndarray, unit: float
-) -> Curve:
+) -> DampedCurve:
     done = np.isfinite(response.damped_mean)
 
     def relative(values: np.ndarray) -> np.ndarray:
         return np.nan_to_num(values[done] / unit)
 
-    return Curve(
+    return DampedCurve(
         name=response.name,
         frequency=response.hertz * response.x[done],
         largest=relative(response.damped_max),

@@ -1,4 +1,4 @@
-"""The demonstration: the shipped mesh through the whole pipeline, or its rigid model; every file of it stays."""
+"""The demonstration: the whole pipeline on the shipped mesh, or on its rigid model; all files are kept."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vanedamp.coupling.sweep.sweep import warm_up_engine
 from vanedamp.files.store import load
 from vanedamp.files.toml_output import write_commented
 from vanedamp.studies.demo import claims
-from vanedamp.studies.demo.figure_file import FOLDER, Effort, Structure
+from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureStructure
 from vanedamp.studies.demo.figure_study import MODES, FigureStudy, Read, Session, prepare, print_claims, study
 from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
@@ -45,7 +45,7 @@ RIGID_FIGURES = ("fig9", "fig10")
 MOTION = "fig10_single"
 #: the file that makes the sweeps again
 PIPELINE = "pipeline.toml"
-#: every curve from all starts: claims and pictures are of the worst at each frequency
+#: every curve is run from all starts: claims and pictures use the worst at each frequency
 EFFORT = Effort(points=61, periods=1500, transient=700, starts=tuple(STARTS))
 _COMMANDS = """\
 The same, step by step:
@@ -73,19 +73,19 @@ _PIPELINE_NOTE = (
 def run_demo(folder: Path, workers: int | None = None, rigid: bool = False) -> Path:
     """Make modes, rigid model, reduction, three figures of the paper and the report. Returns the report's path.
 
-    Case and scenes are left as one would write them, with the pipeline that makes all of it again.
+    Case and scenes are written as a user would write them, with a pipeline file that reproduces all results.
 
-    rigid: take the shipped rigid model and leave out what needs finite elements.
+    rigid: use the shipped rigid model and omit all parts that need finite elements.
     """
     started = time.perf_counter()
     folder.mkdir(parents=True, exist_ok=True)
     results = [] if rigid else [folder / "modes.h5", folder / "rom.h5"]
     sources: list[str] = []
     with WorkerPool(workers or available_cores()) as pool:
-        # compiling the engine takes as long as the finite elements: side by side, and once for all workers
+        # compiling the engine takes as long as the finite elements: both run in parallel, once for all workers
         compiled = pool.submit(warm_up_engine, "line")
         if rigid:
-            structure = Structure.shipped()
+            structure = FigureStructure.shipped()
         else:
             with _stage("mesh, modes, rigid model, reduced model"):
                 structure = prepare(folder)

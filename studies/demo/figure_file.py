@@ -34,7 +34,7 @@ _QUANTITY = re.compile(r"([-+]?[\d.]+(?:e[-+]?\d+)?) ([a-z_]+)")
 
 
 @dataclass(frozen=True)
-class Structure:
+class FigureStructure:
     """The units of a figure's quantities: the rigid model of the first bending, and its excitation.
 
     mass (kg), stiffness (N/m), damping_ratio, frequency (Hz) of the rigid model; amplitude (m) of its undamped
@@ -49,12 +49,12 @@ class Structure:
     rom: Path | None = None
 
     @classmethod
-    def shipped(cls) -> Structure:
+    def shipped(cls) -> FigureStructure:
         """Return the rigid model of the shipped cluster, which needs no finite elements."""
         return cls(**read_toml(FOLDER / "rigid_model.toml"))
 
     @classmethod
-    def load(cls, modes: Path, rom: Path) -> Structure:
+    def load(cls, modes: Path, rom: Path) -> FigureStructure:
         """Read the record that `vanedamp modal` wrote. Raises InputError without rigid model and fatigue strength."""
         _, attributes = load(modes, "modes")
         if "rigid" not in attributes or "fatigue" not in attributes:
@@ -67,8 +67,8 @@ class Structure:
     def unit(self, name: str) -> float:
         """Return a unit: a field's value, `force` at the undamped resonance (N), or `inertia` of the mass there (N).
 
-        `speed` (rad/s) is the one at which a revolution takes a period of the rigid model, `impedance` (N s/m) its mass
-        times that.
+        `speed` (rad/s): one revolution per period of the rigid model; `impedance` (N s/m): its mass
+        times this speed.
         """
         speed = 2 * math.pi * self.frequency
         values = {
@@ -121,7 +121,7 @@ class FigureScenes:
     scenes: dict[str, Scene]
 
     @classmethod
-    def load(cls, file: Path, structure: Structure, effort: Effort | None = None) -> Self:
+    def load(cls, file: Path, structure: FigureStructure, effort: Effort | None = None) -> Self:
         """Read a figure, on a structure. Raises InputError, naming the file."""
         data, scenes = read_toml(file), {}
         try:
@@ -193,8 +193,8 @@ def _damping_ratio(scene: Scene) -> float:
     return getattr(scene.structure, "damping_ratio", None) or 1e-3
 
 
-def _scaled(data: Any, structure: Structure) -> Any:
-    """Return data with its quantities as numbers."""
+def _scaled(data: Any, structure: FigureStructure) -> Any:
+    """Return data with quantities such as "0.5 amplitude" replaced by numbers."""
     if isinstance(data, dict):
         return {key: _scaled(value, structure) for key, value in data.items()}
     if isinstance(data, list):
@@ -212,7 +212,7 @@ def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
-    """Return tables with counted cavities and bodies spelt out; single ones start aside, each in its own place."""
+    """Return tables with counted cavities and bodies written out; single bodies start at different positions."""
     cavities, names = [], {}
     for table in tables.get("cavity", []):
         count = table.get("count")
@@ -225,8 +225,8 @@ def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
         count = table.get("count", 1)
         table = {key: value for key, value in table.items() if key != "count"}
         homes = names.get(table["cavity"], [table["cavity"]])
-        for place, home in enumerate(homes):
-            aside = ((place + 0.5) / len(homes) - 0.5) / 2
-            own = {"position": aside * gaps.get(home, 0.0)} if count == 1 else {}
-            dampers += [own | table | {"cavity": home}] * count
+        for number, home in enumerate(homes):
+            aside = ((number + 0.5) / len(homes) - 0.5) / 2
+            start = {"position": aside * gaps.get(home, 0.0)} if count == 1 else {}
+            dampers += [start | table | {"cavity": home}] * count
     return tables | {"cavity": cavities, "damper": dampers}

@@ -21,12 +21,12 @@ from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest, finite, write_json
 from vanedamp.files.toml_output import schema_name, write_commented, write_schema
 from vanedamp.meshes.vane_cluster import SHIPPED
-from vanedamp.studies.demo.curve import Curve, curves, worst_of
-from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureScenes, Structure
+from vanedamp.studies.demo.curve import DampedCurve, curves, worst_of
+from vanedamp.studies.demo.figure_file import FOLDER, Effort, FigureScenes, FigureStructure
 from vanedamp.studies.demo.pictures import responses_picture
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.jobs.sweep import SweepJob
-from vanedamp.studies.report.claims import CLAIMS, Claim, Study
+from vanedamp.studies.report.claims import CLAIMS, Claim, ClaimStudy
 from vanedamp.studies.worst_start import STARTS
 
 #: modes of the reduced model's file: what `modes = "auto"` chooses from
@@ -39,11 +39,11 @@ CASE = f"#:schema ./{schema_name('case')}\n" + (FOLDER / "case.toml").read_text(
 class Session:
     """Folder, pool and effort of studies.
 
-    pool: of processes, None for this one; effort: less than the figures' files say; resume: continue from checkpoints
-    that the folder has.
+    pool: of processes, None for this one; effort: changes of the figures' files; resume: continue from checkpoints
+    in the folder.
     """
 
-    structure: Structure
+    structure: FigureStructure
     folder: Path
     pool: Executor | None = None
     effort: Effort | None = None
@@ -53,13 +53,13 @@ class Session:
         """Read a figure's scenes, on the structure."""
         return FigureScenes.load(file, self.structure, self.effort)
 
-    def read(self, sweep: Sweep, name: str) -> list[Curve]:
-        """Return the curves of a sweep, each the worst over the starts of the effort."""
-        found, starts = curves(sweep, name), [] if self.effort is None else [STARTS[key] for key in self.effort.starts]
+    def read(self, sweep: Sweep, name: str) -> list[DampedCurve]:
+        """Return the curves of a sweep, each the worst of the effort's starts."""
+        lines, starts = curves(sweep, name), [] if self.effort is None else [STARTS[key] for key in self.effort.starts]
         if not starts:
-            return found
-        count = len(found) // len(starts)
-        return [worst_of(found[place::count], starts) for place in range(count)]
+            return lines
+        count = len(lines) // len(starts)
+        return [worst_of(lines[index::count], starts) for index in range(count)]
 
     def swept(self, figure: FigureScenes, curve: str) -> Sweep:
         """Run the sweep of a curve, and write its scene (.toml) and result (.h5)."""
@@ -81,11 +81,11 @@ class Read:
     """A figure's scenes and curves, and the session in which they were computed."""
 
     figure: FigureScenes
-    curves: dict[str, list[Curve]]
+    curves: dict[str, list[DampedCurve]]
     session: Session
 
     @property
-    def labels(self) -> dict[str, list[Curve]]:
+    def labels(self) -> dict[str, list[DampedCurve]]:
         """The curves by their names in pictures."""
         return {name.replace("_", " "): of for name, of in self.curves.items()}
 
@@ -96,14 +96,14 @@ def draw_first(read: Read, path: Path) -> None:
 
 
 class FigureStudy(NamedTuple):
-    """How a figure is judged and drawn. file: of its scenes."""
+    """How a figure is evaluated and drawn. file: of its scenes."""
 
     file: Path
     claims: Callable[[Read], list[Claim]]
     picture: Callable[[Read, Path], None] = draw_first
 
 
-def study(of: FigureStudy, session: Session) -> Study:
+def study(of: FigureStudy, session: Session) -> ClaimStudy:
     """Run one study: scenes (.toml), sweeps (.h5), picture and, last, claims."""
     figure = session.figure(of.file)
     sweeps = {curve: session.swept(figure, curve) for curve in figure.scenes}
@@ -117,7 +117,7 @@ def study(of: FigureStudy, session: Session) -> Study:
         failed = f" ({count} of {sum(sweep.status.size for sweep in sweeps.values())} points are not ok.)"
         claims = [replace(claim, why=(claim.why + failed).strip()) for claim in claims]
     sources = [f"{figure.stem(curve)}.h5" for curve in sweeps]
-    return written(Study(figure.name, figure.title, sources, claims, ", ".join(trouble)), session.folder)
+    return written(ClaimStudy(figure.name, figure.title, sources, claims, ", ".join(trouble)), session.folder)
 
 
 def provenance(scene: Scene) -> dict[str, Any]:
@@ -127,13 +127,13 @@ def provenance(scene: Scene) -> dict[str, Any]:
 
 
 def _trouble(curve: str, sweep: Sweep) -> list[str]:
-    """Return how many points of a curve have which status other than ok, in words."""
+    """Return the numbers of points that are not ok, by status, in words."""
     counts = Counter(status for status in sweep.status.ravel().tolist() if status != "ok")
     name = curve.replace("_", " ")
     return [f"{name} {count} of {sweep.status.size} {status}".strip() for status, count in counts.items()]
 
 
-def prepare(folder: Path) -> Structure:
+def prepare(folder: Path) -> FigureStructure:
     """Make the shipped cluster's case, with its modes.h5 and rom.h5, in a folder."""
     from vanedamp.studies.case.stages import assemble, modal_analysis, reduction
     from vanedamp.studies.case.tables import Case
@@ -145,7 +145,7 @@ def prepare(folder: Path) -> Structure:
     structure = assemble(Case.load(case))
     modal_analysis(structure).save(modes)
     reduction(structure, MODES).save(reduced)
-    return Structure.load(modes, reduced)
+    return FigureStructure.load(modes, reduced)
 
 
 def write_scene(scene: Scene, path: Path, title: str) -> None:
@@ -157,13 +157,13 @@ def write_scene(scene: Scene, path: Path, title: str) -> None:
     write_commented(path, relative(short_form(scene), path), KINDS["scene"], notes)
 
 
-def written(study: Study, folder: Path) -> Study:
+def written(study: ClaimStudy, folder: Path) -> ClaimStudy:
     """Write a study's claims, and return it."""
     write_json(folder / f"{study.study}{CLAIMS}", finite(asdict(study)))
     return study
 
 
-def print_claims(study: Study, seconds: float) -> None:
+def print_claims(study: ClaimStudy, seconds: float) -> None:
     """Print a study's claims: the paper's words, the finding here, the verdict."""
     print(f"\n{study.study}: {study.title} ({seconds:.1f} s)")
     if study.not_ok:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
-from vanedamp.studies.demo.curve import Curve
+from vanedamp.studies.demo.curve import DampedCurve
 from vanedamp.studies.figures import draw_grid, save, subplots
 from vanedamp.studies.report.charts import COLOURS
 
 GREY, DARK = "#94a3b8", "#475569"
 
 
-def responses_picture(curves: Mapping[str, Curve], title: str, path: Path) -> None:
+def responses_picture(curves: Mapping[str, DampedCurve], title: str, path: Path) -> None:
     """Draw forced responses by their labels, with the undamped and fixed curves of the first."""
     figure, axes = subplots(size=(9.5, 5.2))
     draw_linear(axes, next(iter(curves.values())))
@@ -24,12 +24,12 @@ def responses_picture(curves: Mapping[str, Curve], title: str, path: Path) -> No
     save(figure, path, dpi=110)
 
 
-def draw_linear(axes: Axes, curve: Curve) -> None:
+def draw_linear(axes: Axes, curve: DampedCurve) -> None:
     axes.plot(curve.frequency, 100 * curve.undamped, ":", color=DARK, linewidth=1.4, label="without bodies")
     axes.plot(curve.frequency, 100 * curve.fixed, "--", color=GREY, linewidth=1.4, label="bodies fixed")
 
 
-def draw_damped(axes: Axes, curve: Curve, label: str, colour: str) -> None:
+def draw_damped(axes: Axes, curve: DampedCurve, label: str, colour: str) -> None:
     axes.plot(
         curve.frequency, 100 * curve.largest, ".", color=colour, markersize=3.5, alpha=0.7, label=f"{label}, maximum"
     )

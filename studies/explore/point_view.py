@@ -20,7 +20,7 @@ from vanedamp.studies.kinds.orbits.motions import phase_figure
 from vanedamp.studies.report.motion import motion_of
 from vanedamp.studies.report.motion_page import motion_page
 from vanedamp.studies.report.plane_history import slider_samples
-from vanedamp.studies.report.time_history import History, history_figure
+from vanedamp.studies.report.time_history import TimeHistory, history_figure
 
 #: samples of a period at most, and samples of a run; periods of a run whose events are kept
 _SAMPLES, _MOST_SAMPLES, _MOST_PERIODS = 200, 1_000_000, 100_000
@@ -64,12 +64,12 @@ def view_of(scene: Scene, response: Response) -> PointView:
     """Return the view of a run that kept samples and events."""
     if not len(response.time):
         return PointView(f"{_summary(response)}. The run ended within its first period: there is nothing to draw.")
-    late = History.of(response, scene).late()
+    late = TimeHistory.of(response, scene).late()
     told = {name: text for name, text in response.lines().items() if name in response.quantities}
     return PointView(_summary(response), told, history_figure(late), phase_figure(response), _motion(scene, late))
 
 
-def _motion(scene: Scene, late: History) -> str:
+def _motion(scene: Scene, late: TimeHistory) -> str:
     """Return the document that plays the motion of the bodies; empty without bodies."""
     if not scene.damper:
         return ""

@@ -1,4 +1,4 @@
-"""Export of results: the format follows the file's ending, the writer the kind of the result."""
+"""Export of results: the file's ending sets the format, the kind of the result the writer."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from typing import Any, Protocol
 from vanedamp.files.extensions import ExtensionPoint
 from vanedamp.files.store import decoding
 from vanedamp.files.toml_input import InputError
-from vanedamp.studies.export.record import Record, Saved, read_record
+from vanedamp.studies.export.record import ExportRecord, Saved, read_record
 
 FORMATS = ExtensionPoint(
     "format of exports", "vanedamp.studies.export.formats", "vanedamp.export_formats",
     ("SUMMARY", "ENDINGS", "WRITERS", "OPTIONS"),
 )  # fmt: skip
-#: the kind of a writer that takes results of every kind
+#: the kind of a writer for results of every kind
 ANY = "*"
 #: roles of options that name a file
 INPUT, OUTPUT = "input", "output"
 
 
 class Format(Protocol):
-    """The contract of a format; the folder `formats` says more."""
+    """The contract of a format, described in the folder `formats`."""
 
     SUMMARY: str
     ENDINGS: tuple[str, ...]
@@ -37,9 +37,9 @@ class Format(Protocol):
 def export(result: str | os.PathLike[str] | Saved, path: str | os.PathLike[str], **options: Any) -> tuple[str, ...]:
     """Write a result, or a file's result, to a file of another program, whose ending names the format.
 
-    options: the format's, such as `table="events"` of a .csv (docs/exchange.md). Returns warnings: what the
-    file does not hold. Raises InputError for an unknown ending, a format that cannot hold this kind of result, or
-    an option that is not for it, StoreError for a file that cannot be read or written.
+    options: of the format, such as `table="events"` of a .csv (docs/exchange.md). Returns warnings of data that the
+    file cannot hold. Raises InputError for an unknown ending, a format that cannot hold this kind of result, or
+    an unsuitable option, StoreError for a file that cannot be read or written.
     """
     chosen = format_of(path)
     return write(read_record(result), chosen, path, options)
@@ -47,34 +47,36 @@ def export(result: str | os.PathLike[str] | Saved, path: str | os.PathLike[str],
 
 def format_of(path: str | os.PathLike[str]) -> Format:
     """Return the format of a file's ending. Raises InputError."""
-    known = FORMATS.all()
-    for part in known.values():
-        if Path(path).suffix.lower() in part.ENDINGS:
-            found: Format = part
-            return found
-    endings = ", ".join(ending for part in known.values() for ending in part.ENDINGS)
+    formats = FORMATS.all()
+    for candidate in formats.values():
+        if Path(path).suffix.lower() in candidate.ENDINGS:
+            chosen: Format = candidate
+            return chosen
+    endings = ", ".join(ending for candidate in formats.values() for ending in candidate.ENDINGS)
     raise InputError(f"{path}: expected a file name ending in one of {endings}")
 
 
-def write(record: Record, chosen: Format, path: str | os.PathLike[str], options: dict[str, Any]) -> tuple[str, ...]:
+def write(
+    record: ExportRecord, chosen: Format, path: str | os.PathLike[str], options: dict[str, Any]
+) -> tuple[str, ...]:
     """Write a record in a format. Returns warnings; raises InputError and StoreError."""
     writer = chosen.WRITERS.get(record.kind) or chosen.WRITERS.get(ANY)
     if writer is None:
         able = [
             ending
-            for part in FORMATS.all().values()
-            if part.WRITERS.keys() & {record.kind, ANY}
-            for ending in part.ENDINGS
+            for candidate in FORMATS.all().values()
+            if candidate.WRITERS.keys() & {record.kind, ANY}
+            for ending in candidate.ENDINGS
         ]
         raise InputError(
             f"{record.file}: {_named(record.kind)} cannot go to {Path(path).suffix}; it can to {', '.join(able)}"
         )
-    taken = list(inspect.signature(writer).parameters)[2:]
+    accepted = list(inspect.signature(writer).parameters)[2:]
     for name in options:
-        if name not in taken:
-            known = ", ".join(f"--{_flag(each)}" for each in taken) or "none"
+        if name not in accepted:
+            listed = ", ".join(f"--{_flag(option)}" for option in accepted) or "none"
             raise InputError(
-                f"--{_flag(name)}: is no option of {_named(record.kind)} in {Path(path).suffix}, which has {known}"
+                f"--{_flag(name)}: is no option of {_named(record.kind)} in {Path(path).suffix}, which has {listed}"
             )
     with decoding(record.source) if isinstance(record.source, str | os.PathLike) else nullcontext():
         return tuple(writer(record, Path(path), **options) or ())
@@ -105,5 +107,5 @@ class Option:
 
     @property
     def count(self) -> int | None:
-        """Number of values in the command line; None: one that is no list."""
+        """Number of values on the command line; None: a single value."""
         return len(self.metavar) if isinstance(self.metavar, tuple) else None

@@ -1,4 +1,4 @@
-"""Records of any kind with their dimensions and units, as formats take them."""
+"""Records of any kind with their dimensions and units, the input of formats."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Saved(Protocol):
         """Write the result's HDF5 file."""
 
 
-class Record(NamedTuple):
-    """A record: the file or object it is of, its name, kind, variables by name, and attributes as plain data."""
+class ExportRecord(NamedTuple):
+    """A record: its file or object, file name, kind, variables by name, and attributes as plain data."""
 
     source: Any
     file: str
@@ -47,11 +47,11 @@ class Record(NamedTuple):
         return self.source if isinstance(self.source, ReducedModel) else ReducedModel.load(self.source)
 
 
-def read_record(result: str | os.PathLike[str] | Saved) -> Record:
+def read_record(result: str | os.PathLike[str] | Saved) -> ExportRecord:
     """Return the record of a result, in a file or in memory. Raises StoreError."""
     if isinstance(result, str | os.PathLike):
         kind, variables, attributes = store.load_any(result)
-        return Record(
+        return ExportRecord(
             result, str(result), kind, variables, {name: _decoded(value) for name, value in attributes.items()}
         )
     if not hasattr(result, "save"):

@@ -1,4 +1,4 @@
-"""Matrices of reduced models for files of other codes, and the file by which `vanedamp import` reads them back."""
+"""Matrices of reduced models in files of other codes, and the description with which `vanedamp import` reads them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vanedamp.files.toml_output import toml
 from vanedamp.rom.external import external_model, plain_matrices
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.export.export import OUTPUT, Option
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 
 DESCRIPTION = Option(
     "description", "of a reduced model's matrices: write the file by which `vanedamp import` reads them",
@@ -27,15 +27,15 @@ COORDINATES = Option(
     "coordinates", "of a reduced model's matrices: own, the first of which are the interface's (default), or natural "
     "modes, which lose nothing to the digits of a text", "own|natural",
 )  # fmt: skip
-#: of a format: writes matrices of a model by name to a file; returns the names in the file
+#: function of a format: writes matrices of a model by name to a file; returns the names in the file
 Writer = Callable[[Path, ReducedModel, Mapping[str, np.ndarray]], dict[str, str]]
-#: change of natural frequencies by the digits of a text that is reported
+#: relative change of natural frequencies by rounding in a text file that is reported
 _NOTABLE = 1e-9
 
 
 def write_model(
-    record: Record, path: Path, coordinates: str | None, description: str | None, write: Writer, *, text: bool = True,
-    damping: bool = True, base_load: bool = False,
+    record: ExportRecord, path: Path, coordinates: str | None, description: str | None, write: Writer, *,
+    text: bool = True, damping: bool = True, base_load: bool = False,
 ) -> tuple[str, ...]:  # fmt: skip
     """Write the matrices of a reduced model, and their description. Returns warnings; raises InputError.
 
@@ -52,7 +52,7 @@ def write_model(
     return _left_out(model, damping, base_load) + lost
 
 
-def _model_in(record: Record, coordinates: str | None) -> ReducedModel:
+def _model_in(record: ExportRecord, coordinates: str | None) -> ReducedModel:
     """Return the reduced model of a record in its own coordinates or natural ones. Raises InputError."""
     if coordinates not in (None, "own", "natural"):
         raise InputError(f"--coordinates: expected own or natural, not {coordinates!r}")
@@ -64,10 +64,10 @@ def _model_in(record: Record, coordinates: str | None) -> ReducedModel:
 
 
 def _lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> tuple[str, ...]:
-    """Return a warning where the digits of a text file change the natural frequencies of the model in it."""
-    found = read_matrices(file)
+    """Return a warning if rounding in a text file changes the natural frequencies of its model."""
+    matrices = read_matrices(file)
     rows = dict(zip(model.interface, plain_matrices(model)["selection"], strict=True))
-    again, _ = external_model(found[names["mass"]], found[names["stiffness"]], rows, damping_ratio=0.0)
+    again, _ = external_model(matrices[names["mass"]], matrices[names["stiffness"]], rows, damping_ratio=0.0)
     frequencies = model.natural_frequencies_hz[model.rigid_modes :]
     change = np.abs(again.natural_frequencies_hz[model.rigid_modes :] / frequencies - 1.0).max(initial=0.0)
     if change <= _NOTABLE:
@@ -78,7 +78,7 @@ def _lost_digits(model: ReducedModel, file: Path, names: Mapping[str, str]) -> t
 
 
 def _left_out(model: ReducedModel, damping: bool, base_load: bool) -> tuple[str, ...]:
-    """Return what files of mass, stiffness and, perhaps, damping and base load do not say of a model."""
+    """Return warnings of properties that files of mass, stiffness and perhaps damping and base load omit."""
     lacks = []
     if not damping and model.damping_ratio is None and np.any(model.damping):
         lacks.append("the damping matrix: this format holds none, and the model has no damping ratio")

@@ -1,1 +1,1 @@
-"""Long commands, each a job: an input that is checked, work that is shown and resumes after a kill, and its results."""
+"""Long commands are jobs: checked input, work with progress that can resume after a kill, and results."""

@@ -1,7 +1,7 @@
-"""The cost of a command, estimated before the work: rejected if it takes too long or too much memory.
+"""The cost of a command, estimated before the work: commands that need too much time or memory are rejected.
 
-Known costs refer to one body on a rigid structure (docs/accuracy.md); richer scenes take more. The bounds are
-generous: whoever meets one has most likely slipped by some powers of ten.
+Costs refer to one body on a rigid structure (docs/accuracy.md); larger scenes take more. The bounds are
+generous: an input that exceeds one is most likely wrong by powers of ten.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from vanedamp.studies.life.study import LifeStudy
     from vanedamp.studies.optimisation.study import Study
 
-#: s of a run, in addition to its periods: alone, and of a sweep whose points run as one (coupling.sweep.alike)
+#: s of a run in addition to its periods: of a single run, and in a sweep that runs as a batch (coupling.sweep.alike)
 RUN, TOGETHER = 1.5e-3, 1e-5
 #: bytes of a period's record, of a sample of one channel, and of a finished point
 _RECORD, _SAMPLE, _POINT = 300, 8, 400
@@ -34,7 +34,7 @@ MOST_POINTS, MOST_BYTES, MOST_SECONDS = 1_000_000, 8e9, 30 * 86400.0
 
 
 def check_run(scene: Scene, samples: int = 0) -> None:
-    """Reject a run whose records fill the memory, or that takes a month. Raises InputError."""
+    """Reject a run whose records exceed the memory, or that takes a month. Raises InputError."""
     periods, channels = scene.time.simulated, 2 * (1 + len(scene.damper) + len(scene.friction_damper))
     channels += _IN_PLANE * len(scene.damper) if scene.planar else 0
     channels += _modes(scene) if samples else 0
@@ -121,7 +121,7 @@ def beginning(scene: Scene) -> float:
 
 
 def run_seconds(scene: Scene) -> float:
-    """Return the processor time of a run, s, of one body on a rigid structure: richer scenes take more."""
+    """Return the processor time of a run, s, of one body on a rigid structure: larger scenes take more."""
     return beginning(scene) + scene.time.simulated * scene.solver.seconds_per_period
 
 

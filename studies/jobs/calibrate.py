@@ -30,26 +30,28 @@ class CalibrateJob(Job):
 
     def work(self, means: Means) -> JobResult:
         """Calibrate."""
-        found = calibrate(self.case, means.checkpoint)
-        result = found.to_json()
+        calibration = calibrate(self.case, means.checkpoint)
+        result = calibration.to_json()
         files: dict[str, Write] = {
-            "case": partial(save_tuned_case, self.source, found),
-            "scene": partial(save_rigid_scene, self.source, found),
+            "case": partial(save_tuned_case, self.source, calibration),
+            "scene": partial(save_rigid_scene, self.source, calibration),
         }
-        return JobResult(found, lambda _: _summary(result), _sentence(found), (), found.warnings, files)
+        return JobResult(
+            calibration, lambda _: _summary(result), _sentence(calibration), (), calibration.warnings, files
+        )
 
 
-def _sentence(found: Calibration) -> str:
+def _sentence(calibration: Calibration) -> str:
     """Return frequency, damping and factors of the tuned numbers."""
-    rigid, factors = found.rigid, ""
-    if found.tuning is not None:
-        pairs = zip(found.tuning.names, found.tuning.factors.tolist(), strict=True)
+    rigid, factors = calibration.rigid, ""
+    if calibration.tuning is not None:
+        pairs = zip(calibration.tuning.names, calibration.tuning.factors.tolist(), strict=True)
         factors = "; " + ", ".join(f"{name} times {factor:.4g}" for name, factor in pairs)
     return f"{rigid.frequency_hz:.6g} Hz, damping ratio {rigid.damping_ratio:.4g}{factors}"
 
 
 def _summary(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what was tuned, the rigid model and the excitation."""
+    """Yield the tuned parameters, the rigid model and the excitation."""
     tuning = result["tuning"]
     if tuning:
         yield "target/Hz      before         after          MAC"
@@ -74,9 +76,9 @@ def _summary(result: Mapping[str, Any]) -> Iterator[str]:
     yield from cavity_lines(result)
     if excitation:
         spot = excitation["hot_spot"]
-        place = ", ".join(f"{value:.4g}" for value in spot["coordinates"])
+        position = ", ".join(f"{value:.4g}" for value in spot["coordinates"])
         yield (
             f"{excitation['share']:.0%} of the fatigue strength at {excitation['amplitude']:.4g} m"
             f"{plus_minus(spot['error'])}, force {excitation['force']:.4g} N at resonance; hot spot at "
-            f"({place}) m in {spot['group']}"
+            f"({position}) m in {spot['group']}"
         )

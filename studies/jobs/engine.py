@@ -15,10 +15,10 @@ from vanedamp.studies.terminal import stage
 def compile_engine(scenes: Iterable[Scene], pool: Executor | None = None) -> None:
     """Compile the engine that scenes need, which a progress that begins afterwards does not count.
 
-    Left out are scenes with open choices, which decide what is compiled.
+    Scenes with open choices are left out, since the choices decide what is compiled.
     """
     title = "load the engine; the first time it is compiled, which takes a minute or two"
-    with stage(title), suppress(BrokenExecutor):  # a scene that ends its worker does so again
+    with stage(title), suppress(BrokenExecutor):  # a scene that ends its worker is reported when it runs
         for scene in scenes:
             if leaves_open(scene):
                 continue

@@ -35,7 +35,7 @@ class EnsembleJob(SceneJob):
         return members(self.of)
 
     def check(self, workers: int) -> None:
-        """Reject more points than anyone needs, or what takes a month."""
+        """Reject too many points, or an ensemble that takes a month."""
         check_sweep(self.of, workers)
 
     def notes(self) -> Iterable[str]:
@@ -43,7 +43,7 @@ class EnsembleJob(SceneJob):
         return choice_notes(self.points.grid.estimate, self.points.grid.advice)
 
     def warnings(self) -> Iterable[str]:
-        """Return those of the points."""
+        """Return the warnings of the points."""
         return self.points.grid.warnings
 
     def finished(self, checkpoint: Path | None) -> int:

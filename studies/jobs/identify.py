@@ -22,7 +22,7 @@ from vanedamp.studies.jobs.job import Job, JobResult, Means
 
 @dataclass(frozen=True)
 class IdentifyJob(Job):
-    """Finds numbers of a scene; budget: s, by default the study's."""
+    """Finds numbers of a scene; budget: s, by default that of the study."""
 
     study: IdentificationStudy
     budget: float | None = None
@@ -30,7 +30,7 @@ class IdentifyJob(Job):
     PARALLEL: ClassVar[bool] = True
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Read the study, or a file with [deviations]."""
         if "deviations" in read_toml(arguments.input):
             return DeviationsJob.of_arguments(arguments)
@@ -49,11 +49,11 @@ class IdentifyJob(Job):
 
     def work(self, means: Means) -> JobResult:
         """Find them."""
-        found = identify(self.study, means.pool, means.report, means.provenance, means.checkpoint, budget=self.budget)
+        result = identify(self.study, means.pool, means.report, means.provenance, means.checkpoint, budget=self.budget)
         return JobResult(
-            found, lambda _: _summary(found), f"{found.status.value}, {found.sentence.removesuffix('.')}",
-            warnings=found.notes, files={"scene": found.save_scene},
-            unfinished=found.status is IdentificationStatus.BUDGET,
+            result, lambda _: _summary(result), f"{result.status.value}, {result.sentence.removesuffix('.')}",
+            warnings=result.notes, files={"scene": result.save_scene},
+            unfinished=result.status is IdentificationStatus.BUDGET,
         )  # fmt: skip
 
 
@@ -65,7 +65,7 @@ class DeviationsJob(Job):
     TITLE: ClassVar[str] = "deviations"
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Read the table. Raises InputError for options of a search."""
         if arguments.budget is not None:
             raise InputError("--budget: not for deviations of a ring, which take no search")
@@ -81,19 +81,19 @@ class DeviationsJob(Job):
     def work(self, means: Means) -> JobResult:
         """Find them."""
         provenance = {"table": asdict(self.table)} | means.provenance
-        found = replace(identify_deviations(self.table), provenance=provenance)
-        sentence = f"misfit {found.misfit:.3g} of omega^2 u"
+        deviations = replace(identify_deviations(self.table), provenance=provenance)
+        sentence = f"misfit {deviations.misfit:.3g} of omega^2 u"
         lines = [sentence, "sector  stiffness deviation  standard deviation"]
-        for sector, (value, error) in enumerate(zip(found.stiffness, found.errors, strict=True)):
+        for sector, (value, error) in enumerate(zip(deviations.stiffness, deviations.errors, strict=True)):
             lines.append(f"{sector:6}{value:21.6f}{error:20.2g}")
-        rows = partial(write_csv, header=("sector", "deviation"), rows=enumerate(found.stiffness.tolist()))
-        return JobResult(found, lambda _: lines, sentence, files={"csv": rows})
+        rows = partial(write_csv, header=("sector", "deviation"), rows=enumerate(deviations.stiffness.tolist()))
+        return JobResult(deviations, lambda _: lines, sentence, files={"csv": rows})
 
 
-def _summary(found: Identification) -> Iterator[str]:
-    yield f"status {found.status.value}, {found.counts['runs']} runs, {found.wall_time_s:.0f} s"
-    yield from (f"read {one['source']}" for one in found.study["measured"] if one["source"])
-    yield from number_texts(found)
-    yield from noise_texts(found)
-    if found.proposal is not None:
-        yield proposal_text(found.paths, found.proposal)
+def _summary(result: Identification) -> Iterator[str]:
+    yield f"status {result.status.value}, {result.counts['runs']} runs, {result.wall_time_s:.0f} s"
+    yield from (f"read {measurement['source']}" for measurement in result.study["measured"] if measurement["source"])
+    yield from number_texts(result)
+    yield from noise_texts(result)
+    if result.proposal is not None:
+        yield proposal_text(result.paths, result.proposal)

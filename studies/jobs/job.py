@@ -1,4 +1,4 @@
-"""A long command: its input, its checks, its work and what comes of it. A command runs one, or a stage of a pipeline.
+"""A long command: its input, checks, work and results. A job is run by a command or by a stage of a pipeline.
 
 A job is one class in a file of its own, named in `studies.commands.declarations`, and in `studies.pipeline.tables` if
 a pipeline may hold it.
@@ -22,11 +22,11 @@ from vanedamp.files.store import clear_leftovers
 from vanedamp.studies.scene_checks import check_moved, check_numbers
 from vanedamp.studies.terminal import progress
 
-#: takes the path of a file and writes it
+#: writes the file at a path
 Write = Callable[[str], object]
 
 
-class Saved(Protocol):
+class SavedResult(Protocol):
     """A result with a file and JSON."""
 
     def save(self, path: str) -> object:
@@ -37,9 +37,9 @@ class Saved(Protocol):
 
 
 class Means(NamedTuple):
-    """What a job works with.
+    """Resources of a job.
 
-    pool: worker processes, None: this process; report: called with the parts done, and of all; checkpoint: a file to
+    pool: worker processes, None: this process; report: called with the parts done and in total; checkpoint: a file to
     which finished parts are written and from which the same job resumes, None: nowhere; provenance: of the result.
     """
 
@@ -51,20 +51,20 @@ class Means(NamedTuple):
 
 @dataclass(frozen=True)
 class JobResult:
-    """What came of a job.
+    """The outcome of a job.
 
     record     the result
-    lines      for people, of the seconds that it took
+    lines      function of the elapsed time, s, that returns printed lines
     sentence   the result in one line
     notes      about choices that were made, on standard error
     warnings   about the input
     files      further files by the options that name them; `output` is the record's unless it is here
     data       JSON in addition to the record's, or in its place
     ran        points that ran now, of a job that counts them
-    unfinished whether the checkpoint stays, for the same command to go on from
+    unfinished whether the checkpoint is kept, so that the same command can resume
     """
 
-    record: Saved
+    record: SavedResult
     lines: Callable[[float], Iterable[str]]
     sentence: str
     notes: Sequence[str] = ()
@@ -75,18 +75,18 @@ class JobResult:
     unfinished: bool = False
 
     def to_json(self, seconds: float) -> dict[str, Any]:
-        """Return the result for machines. The record is the same however it came about, its time is not in it."""
+        """Return the JSON result. The record itself does not contain the time, so that it is reproducible."""
         rate = {} if self.ran is None else {"points_per_second": self.ran / seconds}
         return {"wall_time_s": seconds} | rate | self.record.to_json() | dict(self.data)
 
     @property
     def writers(self) -> dict[str, Write]:
-        """What writes each file, by the option that names it."""
-        own: dict[str, Write] = {"output": self.record.save}
-        return own | dict(self.files)
+        """Function that writes each file, by the option that names it."""
+        writers: dict[str, Write] = {"output": self.record.save}
+        return writers | dict(self.files)
 
     def clear(self, checkpoint: Path | None) -> None:
-        """Remove a checkpoint once the files are safe, unless the same command is to go on from it."""
+        """Remove the checkpoint after the files are written, unless the same command is to resume from it."""
         if checkpoint is not None and not self.unfinished:
             clear(checkpoint)
             clear_leftovers(checkpoint.with_suffix(""))
@@ -103,13 +103,13 @@ class Job(ABC):
 
     #: of its progress
     TITLE: ClassVar[str]
-    #: whether it takes worker processes
+    #: whether it uses worker processes
     PARALLEL: ClassVar[bool] = False
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Return the job of a command line and of what the command has read. Raises InputError."""
-        return cls(arguments.input, *given)
+        return cls(arguments.input, *inputs)
 
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any], path: Path, **options: Any) -> Self:
@@ -127,10 +127,10 @@ class Job(ABC):
         return None
 
     def check(self, workers: int) -> None:  # noqa: B027
-        """Reject what takes too long or too much memory. Raises InputError."""
+        """Reject a job that takes too long or too much memory. Raises InputError."""
 
     def notes(self) -> Iterable[str]:
-        """Return what to say before it runs."""
+        """Return notes to print before it runs."""
         return ()
 
     def warnings(self) -> Iterable[str]:
@@ -140,12 +140,12 @@ class Job(ABC):
     def finished(self, checkpoint: Path | None) -> int:
         """Return the number of parts in a checkpoint. Raises InputError for one of another input.
 
-        Jobs whose work begins with their checkpoint leave that to it.
+        Jobs that read the checkpoint when their work begins return 0.
         """
         return 0
 
     def compiled(self) -> Iterable[Scene]:
-        """Return scenes whose engine is compiled before the clock of the progress starts."""
+        """Return scenes whose engine is compiled before the timing of the progress starts."""
         return () if self.scene is None else (self.scene,)
 
     @abstractmethod
@@ -155,9 +155,9 @@ class Job(ABC):
     def run(
         self, pool: Callable[[], Executor | None] = lambda: None, checkpoint: Path | None = None, title: str = ""
     ) -> tuple[JobResult, float]:
-        """Compile the engine, and do the work with its progress shown. Returns what came of it, and its time, s.
+        """Compile the engine, and do the work with its progress shown. Returns the outcome and its time, s.
 
-        pool: returns worker processes, which are slow to start, once the checkpoint is known to belong to the job.
+        pool: returns worker processes, which are slow to start; called when the checkpoint is known to fit the job.
         """
         self.finished(checkpoint)
         processes = pool() if self.PARALLEL else None
@@ -198,14 +198,14 @@ class SceneJob(Job):
 
     @classmethod
     def check_scene(cls, scene: Scene, source: str) -> None:
-        """Raise InputError for a scene that the job does not take."""
+        """Raise InputError for a scene that the job does not accept."""
         check_moved(scene)
         check_numbers(scene, source)
 
 
 @dataclass(frozen=True)
 class StudyJob(Job):
-    """A job on a study, a scene and what is sought with it; STUDY: its class; FILE: the record of its input file."""
+    """A job on a study of a scene. STUDY: its class; FILE: the record of its input file."""
 
     study: Any
     STUDY: ClassVar[Any]
@@ -224,7 +224,7 @@ class StudyJob(Job):
         return self.scene.files
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Read the study."""
         return cls(arguments.input, cls.STUDY.load(arguments.input))
 
@@ -235,7 +235,7 @@ class StudyJob(Job):
 
 
 def choice_notes(estimate: Mapping[str, Any] | None, advice: Mapping[str, Any] | None) -> Iterator[str]:
-    """Yield which model `modes = "auto"` and which bodies `shape = "auto"` have chosen, and why."""
+    """Yield the model chosen by `modes = "auto"` and the bodies chosen by `shape = "auto"`, with reasons."""
     for key, chosen in (("structure.modes", estimate), ("damper.shape", advice)):
         if chosen is not None:
             yield f"{key}: {chosen['sentence']}"

@@ -1,4 +1,4 @@
-"""`vanedamp life`: how long a damper damps, by the wear of its contacts."""
+"""`vanedamp life`: service life of a damper, from the wear of its contacts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`vanedamp optimise`: mass, gap and number of bodies that reduce most, as designed and within tolerances."""
+"""`vanedamp optimise`: mass, gap and number of bodies with the largest reduction, nominal and within tolerances."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class OptimiseJob(StudyJob):
 
     def work(self, means: Means) -> JobResult:
         """Search."""
-        found = optimise(self.study, means.pool, means.report, means.provenance, means.checkpoint)
-        return JobResult(found, partial(_summary, found), found.sentence, warnings=self.study.doubts)
+        result = optimise(self.study, means.pool, means.report, means.provenance, means.checkpoint)
+        return JobResult(result, partial(_summary, result), result.sentence, warnings=self.study.doubts)
 
 
 def _summary(optimisation: Optimisation, seconds: float) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""`vanedamp orbits`: periodic orbits over a number of the scene; points found are kept and survive a kill."""
+"""`vanedamp orbits`: periodic orbits versus a scene parameter; points found are stored and survive a kill."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def _summary(result: Branches, seconds: float) -> Iterator[str]:
     for number, branch in enumerate(result.branches):
         source = ""
         if branch.source is not None:
-            parent, place = branch.source
-            source = f", from the {result.branches[parent].special[place].kind} of branch {parent}"
+            parent, index = branch.source
+            source = f", from the {result.branches[parent].special[index].kind} of branch {parent}"
         low, high = branch.parameter.min(), branch.parameter.max()
         open_ones = f", {branch.undetermined.sum()} undetermined" if branch.undetermined.any() else ""
         yield (

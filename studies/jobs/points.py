@@ -1,4 +1,4 @@
-"""The points of a sweep or an ensemble before they run: those that are done, and the first and the last scene."""
+"""The points of a sweep or an ensemble before they run: the number already done, and the first and last scene."""
 
 from __future__ import annotations
 

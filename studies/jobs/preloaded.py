@@ -1,6 +1,6 @@
-"""Loaded once by the server from which the workers of a pool are forked (studies.jobs.workers): the engine, compiled.
+"""Loads the compiled engine in the server from which the workers of a pool are forked (studies.jobs.workers).
 
-Workers share its memory until one writes there. It loads compiled code and compiles nothing: that
+Workers share its memory until one writes to it. It loads compiled code but compiles nothing: that
 would take a minute in which it could not be interrupted, and the first worker does it just as well.
 """
 
@@ -16,7 +16,7 @@ def _load() -> None:
     try:
         with loading_only():
             warm_up()
-    except Exception:  # whatever it is, a worker meets it as well and can tell it
+    except Exception:  # a worker has the same error and can report it
         return
     gc.collect()
     gc.freeze()  # a collection in a worker would write to every object

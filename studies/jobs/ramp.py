@@ -54,8 +54,8 @@ def _summary(result: Ramp, seconds: float) -> Iterator[str]:
             f"{abs(run.rate):18.6g} {run.direction:9} {run.peak:12.5g} {run.at_peak('frequency'):10.6g} "
             f"{result.share(run):24.4f}  {run.status}"
         )
-        for one, largest, mean in run.limits:
-            yield f"{'':18} {one.name}: at most {largest:.4g} {one.unit}, mean {mean:.4g} {one.unit} ({one.about})"
+        for item, largest, mean in run.limits:
+            yield f"{'':18} {item.name}: at most {largest:.4g} {item.unit}, mean {mean:.4g} {item.unit} ({item.about})"
         for spot, of in result.tops_of_stress(run).items():
             error = plus_minus(result.provenance["hot_spots"][spot].get("error"))
             yield f"{'':18} {spot}: largest amplitude of von Mises stress {of['von_mises'] / 1e6:.4g} MPa{error}"

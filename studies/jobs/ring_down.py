@@ -29,7 +29,7 @@ class RingDownJob(SceneJob):
 
     @classmethod
     def check_scene(cls, scene: Scene, source: str) -> None:
-        """Raise InputError for a scene without [ring_down]; nothing else need move it."""
+        """Raise InputError for a scene without [ring_down]; no other excitation is required."""
         check_numbers(scene, source)
         table_of(scene)
 
@@ -71,9 +71,9 @@ def _summary(result: RingDown) -> Iterator[str]:
                 f"{spot}: amplitude of von Mises stress {first:.4g} MPa in the first period, {last:.4g} in the last"
                 f"{plus_minus(facts.get('error'))}"
             )
-    for one, value in (each for each in result.numbers if each[0].limited):
-        yield f"{one.name}: {value:.4g} {one.unit} ({one.about})"
+    for quantity, value in (entry for entry in result.numbers if entry[0].limited):
+        yield f"{quantity.name}: {value:.4g} {quantity.unit} ({quantity.about})"
     yield from strength_lines(result.strength)
     if result.rest_time is not None:
-        place = without_round_off(float(result.displacement[-1]), float(abs(result.displacement).max()))
-        yield f"at rest from {result.rest_time:.6g} s on, at {place:.6g} m"
+        position = without_round_off(float(result.displacement[-1]), float(abs(result.displacement).max()))
+        yield f"at rest from {result.rest_time:.6g} s on, at {position:.6g} m"

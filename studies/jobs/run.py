@@ -24,7 +24,7 @@ class RunJob(SceneJob):
     """Runs a scene.
 
     events: keep the list of events; samples: per period that are kept; exponents: periods of Lyapunov exponents;
-    moved_start: compare with a second run, from bodies a little aside.
+    moved_start: compare with a second run that starts with bodies slightly displaced.
     """
 
     events: bool = False
@@ -34,9 +34,9 @@ class RunJob(SceneJob):
     TITLE: ClassVar[str] = "run"
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Return the job of a scene, or of all samples of its ranges. Raises InputError for options of a single run."""
-        (scene,) = given
+        (scene,) = inputs
         if not scene.ranges:
             moved = not arguments.no_moved_start
             return cls(arguments.input, scene, arguments.events, arguments.samples, arguments.exponents, moved)
@@ -73,25 +73,25 @@ class RunJob(SceneJob):
 
 
 def _summary(response: Response, result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the figures of a run, its stresses, exponents, sectors, contacts and wear, and last a status not ok."""
+    """Yield the results of a run, with stresses, exponents, sectors, contacts and wear, and last a status not ok."""
     of = units()
     for name, value in result.items():
         if not isinstance(value, dict | list):
             scale = response.amplitude_max if of.get(name) == "m" else 1.0
             yield f"{name:26} {_format(value, scale)} {of.get(name, '')}".rstrip()
     yield from (f"{'stress':26} {spot.sentence}" for spot in response.stress or ())
-    if (found := response.lyapunov) is not None:
+    if (facts := response.lyapunov) is not None:
         yield (
-            f"{'motion':26} {found['motion']}: largest exponent {found['exponent']:.4g} +- {found['confidence']:.2g} "
-            f"1/s, {found['exponent_per_period']:.4g} per period ({found['status']}, {found['periods']} periods)"
+            f"{'motion':26} {facts['motion']}: largest exponent {facts['exponent']:.4g} +- {facts['confidence']:.2g} "
+            f"1/s, {facts['exponent_per_period']:.4g} per period ({facts['status']}, {facts['periods']} periods)"
         )
     if response.sectors is not None:
         yield f"{'sectors':26} {response.sectors.sentence}"
     yield from (f"{'contact':26} {contact.sentence}" for contact in response.contacts or ())
-    for one in response.wear or ():
-        if one.volume_rate:
-            depth = "" if one.depth_rate is None else f", {1e9 * one.depth_rate:.4g} nm/h"
-            yield f"{'wear':26} {one.name}: {one.volume_rate:.4g} m^3/h{depth}, work rate {one.work_rate:.4g} W"
+    for wear in response.wear or ():
+        if wear.volume_rate:
+            depth = "" if wear.depth_rate is None else f", {1e9 * wear.depth_rate:.4g} nm/h"
+            yield f"{'wear':26} {wear.name}: {wear.volume_rate:.4g} m^3/h{depth}, work rate {wear.work_rate:.4g} W"
     if response.status is not Status.OK:  # last, where a reader looks
         yield f"status {response.status}: {field_docstrings(Status)[response.status.name]}"
 

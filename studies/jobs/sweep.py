@@ -1,4 +1,4 @@
-"""`vanedamp sweep`: a run at every point of a grid; finished points are kept in a file and survive a kill."""
+"""`vanedamp sweep`: a run at every point of a grid; finished points are stored in a file and survive a kill."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from vanedamp.studies.headline import format_value
 from vanedamp.studies.jobs.budget import check_run, check_sweep
 from vanedamp.studies.jobs.job import Job, JobResult, Means, SceneJob, Write, choice_notes
 from vanedamp.studies.jobs.points import ends_of, finished
-from vanedamp.studies.report.designs import Design, designs
+from vanedamp.studies.report.designs import DesignCurves, designs
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.report.sector_charts import ring_sentence
 from vanedamp.studies.terminal import progress
@@ -37,8 +37,8 @@ _MOST_LINES = 12
 class SweepJob(SceneJob):
     """Runs a scene at every point of its sweep.
 
-    peak: the name of a file for the point with the highest mean, which runs once more with events and samples;
-    moved_starts: run the peak of each curve from bodies a little aside as well; provenance: further data of the result.
+    peak: file for the point with the highest mean, which is run again with events and samples;
+    moved_starts: also run the peak of each curve with displaced bodies; provenance: further data of the result.
     """
 
     peak: str | None = None
@@ -48,9 +48,9 @@ class SweepJob(SceneJob):
     PARALLEL: ClassVar[bool] = True
 
     @classmethod
-    def of_arguments(cls, arguments: Namespace, *given: Any) -> Job:
+    def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:
         """Return the job of a scene, or of all samples of its ranges. Raises InputError."""
-        (scene,) = given
+        (scene,) = inputs
         if not scene.ranges:
             return cls(arguments.input, scene, arguments.peak, not arguments.no_moved_start)
         from vanedamp.studies.jobs.ensemble import EnsembleJob
@@ -70,7 +70,7 @@ class SweepJob(SceneJob):
 
     @cached_property
     def points(self) -> Grid:
-        """The grid. Raises InputError for a point that is no scene, and for a peak that cannot run by itself."""
+        """The grid. Raises InputError for a point that is no scene, and for a peak that needs a neighbour's state."""
         points = grid(self.of)
         if self.peak is not None:
             self.of.solver.check_samples(PEAK_SAMPLES)
@@ -82,7 +82,7 @@ class SweepJob(SceneJob):
         return points
 
     def check(self, workers: int) -> None:
-        """Reject more points than anyone needs, or what takes a month."""
+        """Reject too many points, or a sweep that takes a month."""
         check_sweep(self.of, workers)
         if self.peak is not None:
             check_run(self.of, PEAK_SAMPLES)
@@ -92,7 +92,7 @@ class SweepJob(SceneJob):
         return choice_notes(self.points.estimate, self.points.advice)
 
     def warnings(self) -> Iterable[str]:
-        """Return those of the points."""
+        """Return the warnings of the points."""
         return self.points.warnings
 
     def finished(self, checkpoint: Path | None) -> int:
@@ -104,7 +104,7 @@ class SweepJob(SceneJob):
         return ends_of(self.points)
 
     def work(self, means: Means) -> JobResult:
-        """Run every point that is not done, and once more the one with the highest mean."""
+        """Run all unfinished points, and the point with the highest mean again."""
         resumed, points = self.finished(means.checkpoint), self.points
         provenance = means.provenance | dict(self.provenance)
         result = sweep(points, means.pool, means.report, means.checkpoint, provenance, self.moved_starts)
@@ -123,8 +123,8 @@ class SweepJob(SceneJob):
         return JobResult(
             result, partial(_summary, result, judged, f"{points.size} points, {resumed} of them from the checkpoint"),
             sentence + (best[0] if best else f"{result.status.size} points"), notes, new, files,
-            {"points_resumed": resumed, "headlines": [each.to_json() for each in responses],
-             "designs": [each.to_json() for each in judged]},
+            {"points_resumed": resumed, "headlines": [response.to_json() for response in responses],
+             "designs": [design.to_json() for design in judged]},
             points.size - resumed,
         )  # fmt: skip
 
@@ -132,14 +132,14 @@ class SweepJob(SceneJob):
 def peak(points: Grid, result: Sweep, path: str) -> tuple[str, dict[str, Write]]:
     """Run the point with the highest mean of those that are ok, with events and samples.
 
-    Points that began with the state of a neighbour do not count, as they would end in another motion. Returns what to
-    say of it, with the name of its file (path), and by the option `peak` what writes that, if
-    there is such a point.
+    Points that began with the state of a neighbour do not count, as a single run would end in another motion. Returns a
+    note with the name of its file (path), and by the option `peak` the function that writes the file, if
+    such a point exists.
     """
     mean = np.where(result.status == "ok", result.amplitude_mean_dynamic, -np.inf)
     directions = points.axes.get("continuation.direction", ())
     if directions:
-        linked = [place for place, direction in enumerate(directions) if direction != "independent"]
+        linked = [position for position, direction in enumerate(directions) if direction != "independent"]
         np.moveaxis(mean, list(points.axes).index("continuation.direction"), 0)[linked] = -np.inf
     index = int(np.argmax(mean))
     if not np.isfinite(mean.flat[index]):
@@ -151,12 +151,12 @@ def peak(points: Grid, result: Sweep, path: str) -> tuple[str, dict[str, Write]]
             chosen.scene, events=True, samples_per_period=PEAK_SAMPLES, start=chosen.start, progress=report
         )  # fmt: skip
     response = replace(response, advice=chosen.advice)
-    made = {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()}
+    provenance = {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()}
     at = ", ".join(f"{axis} = {format_value(value)}" for axis, value in values.items())
-    return f"--peak: {path} is the run at {at}", {"peak": lambda file: response.save(file, made)}
+    return f"--peak: {path} is the run at {at}", {"peak": lambda file: response.save(file, provenance)}
 
 
-def _summary(result: Sweep, judged: Sequence[Design], size: str, seconds: float) -> Iterator[str]:
+def _summary(result: Sweep, judged: Sequence[DesignCurves], size: str, seconds: float) -> Iterator[str]:
     """Yield the headlines of designs, best first, each of its worst curve, and how many points are not ok."""
     if len(judged) > _MOST_LINES:
         yield f"the {_MOST_LINES} best of {len(judged)} designs; --json and the report have all:"

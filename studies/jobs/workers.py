@@ -1,7 +1,7 @@
-"""Processes: a pool for sweeps, and one for a single task.
+"""Process pools: for sweeps, and for a single task.
 
-Why not loky: its workers (3.7.0) import and load the compiled engine each by itself. Two of them have 67 MB of their
-own memory each and end eight runs of a small scene after 2.5 s; these are forked from a server that has loaded it
+Why not loky: each of its workers (3.7.0) imports and loads the compiled engine. Two of them have 67 MB of their
+own memory each and finish eight runs of a small scene after 2.5 s; these are forked from a server that has loaded it
 (`preloaded`): 11 MB and 2.1 s.
 """
 
@@ -26,10 +26,10 @@ _PRELOADED = "vanedamp.studies.jobs.preloaded"
 
 
 class WorkerPool(Executor):
-    """A process pool that starts again after the death of a worker, which breaks a pool of the standard library."""
+    """A process pool that restarts after the death of a worker, which breaks a pool of the standard library."""
 
     def __init__(self, count: int, niceness: int = 0) -> None:
-        """Take the number of processes, and by how much they stand back behind others (os.nice)."""
+        """Set the number of processes and their niceness (os.nice)."""
         self._max_workers, self._niceness = count, niceness
         self._pool = self._new()
 
@@ -50,9 +50,9 @@ class WorkerPool(Executor):
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """End the workers; in the middle of their work after an error or an interrupt."""
+        """End the workers; after an error or an interrupt, without waiting for their work."""
         if kind is not None:
-            # no public name before Python 3.14; without it, their tasks end first
+            # not public before Python 3.14; without it, workers first finish their tasks
             for process in list((getattr(self._pool, "_processes", None) or {}).values()):
                 process.terminate()
         self.shutdown(cancel_futures=kind is not None)
@@ -77,8 +77,8 @@ class _Call(Future[Any]):
 def _context() -> BaseContext:
     """Return how workers begin: not as a fork of this process, which may hold MPI or threads.
 
-    On Linux they are forks of a server that holds neither, and that has the engine in common memory.
-    Elsewhere the system's libraries may have threads of their own, and each worker starts afresh.
+    On Linux they are forks of a server that holds neither and has the engine in shared memory.
+    Elsewhere the system's libraries may have threads of their own, so each worker is a new process.
     """
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
@@ -99,7 +99,7 @@ def _context() -> BaseContext:
 
 
 def _begin(niceness: int) -> None:
-    """Stand back behind other processes, and end this worker with its parent: it would wait for work for ever."""
+    """Lower the worker's priority, and end it with its parent: otherwise it would wait for work for ever."""
     if niceness and hasattr(os, "nice"):
         os.nice(niceness)
     parent = multiprocessing.parent_process()
@@ -116,7 +116,7 @@ def _begin(niceness: int) -> None:
 def workers(count: int | None) -> Iterator[Executor | None]:
     """Yield worker processes with the engine compiled, one for every core by default; None for a single one.
 
-    Raises SweepError when they end as they begin, such as for want of memory.
+    Raises SweepError if they end while starting, such as for lack of memory.
     """
     count = count or available_cores()
     if count == 1:

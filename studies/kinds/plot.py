@@ -14,7 +14,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.report.results import collect, sections
-from vanedamp.studies.report.time_history import History
+from vanedamp.studies.report.time_history import TimeHistory
 
 
 def plot(result: Any, scene: Scene | None = None) -> go.Figure:
@@ -33,7 +33,7 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
     if isinstance(result, str | Path):
         return _of_file(result)
     if isinstance(result, Response):
-        result = History.of(result, scene)
+        result = TimeHistory.of(result, scene)
     if isinstance(result, RingModes):
         result = Interference(result)
     kind = getattr(result, "KIND", None)
@@ -43,12 +43,12 @@ def plot(result: Any, scene: Scene | None = None) -> go.Figure:
 
 
 def _of_file(path: str | Path) -> go.Figure:
-    found = collect([path])
-    if len(found.files) > 1:
+    collected = collect([path])
+    if len(collected.files) > 1:
         raise InputError(f"{path}: holds several results; name one file")
-    ((kind, results),) = ((kind, results) for kind, results in found.kinds.items() if results)
+    ((kind, results),) = ((kind, results) for kind, results in collected.kinds.items() if results)
     (entry,) = results.values()
-    with decoding(*found.records):
+    with decoding(*collected.records):
         return _drawn(kind, entry.record, str(path))
 
 

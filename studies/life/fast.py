@@ -1,4 +1,4 @@
-"""The fast motion of a life: wear rates and amplitudes over the band, by runs that a checkpoint keeps."""
+"""The fast motion of a life: wear rates and amplitudes in the band, from runs stored in a checkpoint."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.worker import OF_A_POINT, SweepError
 from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError, tables
-from vanedamp.studies.life.study import HALVINGS, Contact, LifeStudy
+from vanedamp.studies.life.study import HALVINGS, LifeStudy, WearContact
 from vanedamp.studies.measure import Measure
 
-#: statuses of runs that came to their end, whose figures count; those but the first are reported
+#: statuses of complete runs, whose results count; all but the first are reported
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN, Status.TILTED)
 #: columns of a run before the rates of its contacts and their confidence
 _AMPLITUDE, _CONFIDENCE, _OK, _RATES = range(4)
 
 
-class Found(NamedTuple):
-    """Means over the band at a state.
+class BandMeans(NamedTuple):
+    """Means over the band at a state of wear.
 
     rate, confidence: (c,) volumes of wear per hour, m^3/h, and half widths of their 95 % confidence intervals.
-    amplitude, spread: (f,) what counts over the reference and half widths; nan where a run failed.
-    reduction, reduction_confidence: of what counts of the band.
+    amplitude, spread: (f,) measure relative to the reference, and half widths; nan where a run failed.
+    reduction, reduction_confidence: of the band, and half width.
     """
 
     rate: np.ndarray
@@ -43,10 +43,10 @@ class Found(NamedTuple):
     reduction_confidence: float
 
 
-def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[Contact]]:
-    """Return the row of a run and its contacts; nan, and none, where it failed: the task of a worker.
+def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[WearContact]]:
+    """Return the row of a run and its contacts, in a worker; nan and no contacts where it failed.
 
-    The confidence of what counts is taken to be that of the mean amplitude, relative to it.
+    The relative confidence of the measure is taken to be that of the mean amplitude.
     """
     try:
         response = simulate(scene)
@@ -56,15 +56,16 @@ def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[Contact]
         return np.array([np.nan, np.nan, 0.0]), []
     wear = response.wear or ()
     contacts = [
-        Contact(one.damper, one.side, one.corner, np.nan if one.area is None else one.area, one.share) for one in wear
+        WearContact(item.damper, item.side, item.corner, np.nan if item.area is None else item.area, item.share)
+        for item in wear
     ]
     usable = response.status in _USABLE
     value, confidence = measure.value(response), _or(response.amplitude_mean_confidence, 0.0)
     if measure.quantity.unit != amplitude_mean.unit:
         confidence *= value / max(response.amplitude_mean, np.finfo(float).tiny)
-    known = [value, confidence]
-    rates = [one.volume_rate for one in wear], [_or(one.volume_rate_confidence, 0.0) for one in wear]
-    row = np.array([*known, float(response.status == Status.OK), *rates[0], *rates[1]])
+    measured = [value, confidence]
+    rates = [item.volume_rate for item in wear], [_or(item.volume_rate_confidence, 0.0) for item in wear]
+    row = np.array([*measured, float(response.status == Status.OK), *rates[0], *rates[1]])
     return np.where(usable, row, np.r_[np.nan, np.nan, 0.0, np.full(2 * len(wear), np.nan)]), contacts
 
 
@@ -72,48 +73,48 @@ def _or(value: float | None, default: float) -> float:
     return default if value is None else value
 
 
-class Runs(SceneCheckpoint):
+class LifeRuns(SceneCheckpoint):
     """Runs of a life so far, in memory and in a file (path None: in memory only).
 
-    The same life asks for the same runs in the same order, and begins with those kept.
+    The same life requests the same runs in the same order, so that stored runs come first.
     """
 
     def __init__(
         self, path: str | Path | None, study: LifeStudy, executor: Executor | None, provenance: Mapping[str, Any],
         progress: Callable[[int], None],
     ) -> None:  # fmt: skip
-        """Take up the file's runs. progress: called with the number of runs done.
+        """Load the file's runs. progress: called with the number of runs done.
 
         Raises InputError for a file of another study, or one that cannot be read.
         """
         belongs = {"life": ("study", json.loads(json.dumps(tables(study.table))))}
         super().__init__(path, "life-checkpoint", study.scene, provenance, belongs)
         self.study, self._executor, self._progress = study, executor, progress
-        self.contacts: list[Contact] = []
+        self.contacts: list[WearContact] = []
         self._rows: list[np.ndarray] = []
         self.asked = self.trouble = 0
-        if (found := self.read()) is not None:
-            self._rows = list(found[0]["runs"])
-            self.contacts = [Contact(*one) for one in json.loads(found[1]["contacts"])]
+        if (content := self.read()) is not None:
+            self._rows = list(content[0]["runs"])
+            self.contacts = [WearContact(*values) for values in json.loads(content[1]["contacts"])]
 
-    def at(self, scene: Scene) -> Found:
-        """Run a scene over the band, unless the runs are kept, and return its means. Raises SweepError."""
+    def at(self, scene: Scene) -> BandMeans:
+        """Run a scene over the band, unless its runs are stored, and return the means. Raises SweepError."""
         rows, beyond = self._at(scene, self.study.frequencies.tolist()), 0.0
         band = len(rows)
         if self.study.refines:
             more, beyond = self._refined(scene, rows)
             rows = rows + more
         width = _RATES + 2 * len(self.contacts)
-        found = np.array([np.r_[row[:width], np.full(width - min(len(row), width), np.nan)] for row in rows])
-        self.trouble += int(np.count_nonzero(found[:, _OK] != 1.0))
-        return self._means(found, band, beyond)
+        padded = np.array([np.r_[row[:width], np.full(width - min(len(row), width), np.nan)] for row in rows])
+        self.trouble += int(np.count_nonzero(padded[:, _OK] != 1.0))
+        return self._means(padded, band, beyond)
 
     def _at(self, scene: Scene, frequencies: Sequence[float]) -> list[np.ndarray]:
         """Return the rows of a scene at some frequencies."""
         points = self.study.points(scene, frequencies)
-        kept = self._rows[self.asked : self.asked + len(points)]
+        stored = self._rows[self.asked : self.asked + len(points)]
         self.asked += len(points)
-        for row, contacts in self._run(points[len(kept) :]):
+        for row, contacts in self._run(points[len(stored) :]):
             self.contacts = self.contacts or contacts
             self._rows.append(row)
             self.changed()
@@ -121,30 +122,30 @@ class Runs(SceneCheckpoint):
         return self._rows[self.asked - len(points) : self.asked]
 
     def _refined(self, scene: Scene, band: Sequence[np.ndarray]) -> tuple[list[np.ndarray], float]:
-        """Return rows about the worst point of the band, at ever smaller spacing, and how much worse it may be, m.
+        """Return rows around the worst point of the band, at ever smaller spacing, and the estimated remaining rise, m.
 
-        That is by what the last halving has made it worse, or half of what the one before has: each comes nearer to
-        the worst by a quarter of the rest in a smooth curve, and by half in one that ends in a jump.
+        The estimate is the rise in the last halving, or half of that in the one before: halving reduces the distance
+        to the maximum to a quarter in a smooth curve, and to half in one that ends in a jump.
         """
-        places, heights = self.study.frequencies.tolist(), [_height(row) for row in band]
+        frequencies, heights = self.study.frequencies.tolist(), [_height(row) for row in band]
         more, rise = list[np.ndarray](), 0.0
         for _ in range(HALVINGS if max(heights) > 0.0 else 0):
-            order = np.argsort(places)
+            order = np.argsort(frequencies)
             top = int(np.argmax(heights))
             at = int(np.flatnonzero(order == top)[0])
-            beside = [order[near] for near in (at - 1, at + 1) if 0 <= near < len(order)]
-            middles = [(places[top] + places[near]) / 2 for near in beside]
-            found = self._at(scene, middles)
-            places, more = places + middles, more + found
-            heights += [_height(row) for row in found]
+            neighbours = [order[near] for near in (at - 1, at + 1) if 0 <= near < len(order)]
+            middles = [(frequencies[top] + frequencies[near]) / 2 for near in neighbours]
+            rows = self._at(scene, middles)
+            frequencies, more = frequencies + middles, more + rows
+            heights += [_height(row) for row in rows]
             rise = max(max(heights) - heights[top], rise / 2)
         return more, rise
 
     def content(self) -> tuple[Mapping[str, Variable], Mapping[str, Any], str]:
-        """Return variables of the file, its contacts, and how much is finished, in words."""
+        """Return the variables of the file, its contacts, and the progress in words."""
         width = max(map(len, self._rows), default=0)
         rows = np.array([np.r_[row, np.full(width - len(row), np.nan)] for row in self._rows])
-        contacts = json.dumps([list(one) for one in self.contacts])
+        contacts = json.dumps([list(contact) for contact in self.contacts])
         return {"runs": Variable(rows, ("run", "column"))}, {"contacts": contacts}, f"{len(rows)} runs are finished"
 
     def _run(self, points: Sequence[Scene]) -> Any:
@@ -153,31 +154,31 @@ class Runs(SceneCheckpoint):
             return map(run_point, points, measures)
         return _handed_out(self._executor, points, measures)
 
-    def _means(self, found: np.ndarray, band: int, beyond: float) -> Found:
-        """Return the means of points (k, columns), those of the band first.
+    def _means(self, rows: np.ndarray, band: int, beyond: float) -> BandMeans:
+        """Return the means of rows (k, columns), those of the band first.
 
-        beyond: m, by which the worst may be worse.
+        beyond: estimate by which the maximum may be higher, m.
         """
         table, c = self.study.table, len(self.contacts)
-        ok = np.isfinite(found[:, _AMPLITUDE])
-        amplitude, spread = found[:, _AMPLITUDE] / self.study.reference, found[:, _CONFIDENCE] / self.study.reference
-        # runs that failed say nothing of their frequencies; where all have, nothing is damped
-        counted = np.where(ok, amplitude, -np.inf) if ok.any() else np.ones(len(found))
+        ok = np.isfinite(rows[:, _AMPLITUDE])
+        amplitude, spread = rows[:, _AMPLITUDE] / self.study.reference, rows[:, _CONFIDENCE] / self.study.reference
+        # failed runs are left out; if all have failed, there is no damping
+        counted = np.where(ok, amplitude, -np.inf) if ok.any() else np.ones(len(rows))
         highest = int(np.argmax(counted))
-        weights = np.arange(len(found)) < band
+        weights = np.arange(len(rows)) < band
         if table.dwell == "peak":
-            weights = np.arange(len(found)) == highest
+            weights = np.arange(len(rows)) == highest
         elif not isinstance(table.dwell, str):
-            weights = np.r_[table.dwell, np.zeros(len(found) - band)]
+            weights = np.r_[table.dwell, np.zeros(len(rows) - band)]
         weights = weights * ok
         weights = weights / max(weights.sum(), np.finfo(float).tiny)
-        rates = np.where(ok[:, None], found[:, _RATES:], 0.0)
-        own, known = counted[:band], np.where(ok, spread, 0.0)
-        reduction, confidence = 1.0 - float(counted[highest]), float(known[highest]) + beyond / self.study.reference
+        rates = np.where(ok[:, None], rows[:, _RATES:], 0.0)
+        in_band, half = counted[:band], np.where(ok, spread, 0.0)
+        reduction, confidence = 1.0 - float(counted[highest]), float(half[highest]) + beyond / self.study.reference
         if table.over_band == "mean":
-            reduction = 1.0 - float(own[np.isfinite(own)].mean())
-            confidence = float(np.sqrt((known[:band] ** 2).sum()) / max(ok[:band].sum(), 1))
-        return Found(
+            reduction = 1.0 - float(in_band[np.isfinite(in_band)].mean())
+            confidence = float(np.sqrt((half[:band] ** 2).sum()) / max(ok[:band].sum(), 1))
+        return BandMeans(
             weights @ rates[:, :c], np.sqrt(weights**2 @ rates[:, c:] ** 2), amplitude[:band], spread[:band],
             reduction, confidence,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""How long a damper damps: wear opens its cavities, and the response is computed anew until the reduction is lost."""
+"""Service life of a damper: wear opens its cavities, and the response is recomputed until the reduction is lost."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ import numpy as np
 
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, tables
-from vanedamp.studies.life.fast import Found, Runs
+from vanedamp.studies.life.fast import BandMeans, LifeRuns
 from vanedamp.studies.life.record import LifeRecord, sentence_of
 from vanedamp.studies.life.slow import STAGES, Moment, Steps, between, integrate, steps_left
-from vanedamp.studies.life.study import LifeStudy, Wearing
+from vanedamp.studies.life.study import LifeStudy, WearEffect
 from vanedamp.studies.worst_start import worst_start
 
-#: width of the interval in which the threshold is passed, over the hours, below which it is not halved any more
+#: relative width of the interval with the crossing of the threshold at which halving stops
 _CLOSE = 0.01
-#: fraction of a body's mass below which it is worn away
+#: below this fraction of its mass a body counts as worn away
 _LEFT = 0.05
 
 
@@ -34,13 +34,13 @@ def life(
 ) -> LifeRecord:
     """Integrate the wear of a damper over the hours of its study, or until the reduction is lost with certainty.
 
-    progress: called with the number of runs done and of those expected; checkpoint: a file to which finished runs are
-    written and from which an interrupted life resumes; the caller removes it once the result is safe
+    progress: called with the numbers of finished and expected runs; checkpoint: a file to which finished runs are
+    written and from which an interrupted life resumes; the caller removes it after the result is saved
     (files.checkpoint_file.clear).
-    Raises InputError for a contact that opens a gap and whose patch is not known, SweepError where workers are lost.
+    Raises InputError for a contact that opens a gap and has no known patch, SweepError if workers are lost.
     """
     expected = _Expected(study, progress)
-    with Runs(checkpoint, study, executor, provenance or {}, expected) as runs:
+    with LifeRuns(checkpoint, study, executor, provenance or {}, expected) as runs:
         try:
             first = runs.at(study.scene)
             wearing = study.wearing(runs.contacts)
@@ -56,7 +56,7 @@ def life(
 
 
 class _Expected:
-    """Progress in runs. total: of those expected so far."""
+    """Progress in runs. total: runs expected so far."""
 
     def __init__(self, study: LifeStudy, progress: Callable[[int, int], None] | None) -> None:
         self._study, self._progress, self.total = study, progress, study.runs
@@ -67,75 +67,75 @@ class _Expected:
             self._progress(done, max(self.total, done))
 
     def after(self, done: int) -> Callable[[int, int], None]:
-        """Return the progress of runs that follow those done."""
-        return lambda own, _: self(done + own)
+        """Return the progress function of runs that follow finished ones."""
+        return lambda more, _: self(done + more)
 
-    def at(self, asked: int, before: Moment[Found] | None, now: Moment[Found], steps: Steps) -> None:
-        """Expect the runs from a moment on, with those asked for so far and the moment before.
+    def at(self, asked: int, before: Moment[BandMeans] | None, now: Moment[BandMeans], steps: Steps) -> None:
+        """Estimate the total from the present moment, the one before and the runs requested so far.
 
-        The reduction goes on as since then; once it is lost, the time at which that was is halved a few times.
+        The reduction is extrapolated linearly; when it is lost, the interval of the crossing is halved a few times.
         """
         table, halved = self._study.table, 0
         end, step = table.hours, 0.0 if table.steps is None else table.hours / table.steps
         if before is not None:
             step = now.time - before.time
-            left = now.found.reduction + now.found.reduction_confidence - self._study.threshold
+            margin = now.found.reduction + now.found.reduction_confidence - self._study.threshold
             falls = (before.found.reduction - now.found.reduction) / step
-            if falls > 0.0 and left > 0.0 and now.time + left / falls < end:
-                end = now.time + left / falls
+            if falls > 0.0 and margin > 0.0 and now.time + margin / falls < end:
+                end = now.time + margin / falls
                 halved = max(math.ceil(math.log2(step / (_CLOSE * table.hours))), 0)
         evaluations = len(STAGES) * steps_left(now, end, step, steps) + halved
         self.total = asked + evaluations * self._study.each + self._study.starts
 
 
 class WornAway(Exception):
-    """A body is worn away within a step, as steps of a fixed number may."""
+    """A body is worn away within a step, which can happen with a fixed number of steps."""
 
 
 class _Course:
-    """Rates by volumes of wear, and the scales of these."""
+    """Rates as a function of volumes of wear, and scales of the volumes."""
 
-    def __init__(self, study: LifeStudy, wearing: Wearing, runs: Runs, first: Found) -> None:
+    def __init__(self, study: LifeStudy, wearing: WearEffect, runs: LifeRuns, first: BandMeans) -> None:
         self.study, self.wearing, self._runs = study, wearing, runs
-        self._new: Found | None = first
+        self._new: BandMeans | None = first
 
     @property
     def asked(self) -> int:
-        """Runs asked for so far."""
+        """Runs requested so far."""
         return self._runs.asked
 
-    def rates(self, volume: np.ndarray) -> Found:
-        """Return what is found with some wear."""
+    def rates(self, volume: np.ndarray) -> BandMeans:
+        """Return the means at given volumes of wear."""
         if np.any(self.wearing.lost(volume) >= 1.0):
             raise WornAway
-        if self._new is not None:  # the first runs have told the contacts
-            found, self._new = self._new, None
-            return found
+        if self._new is not None:  # of the first runs, which determined the contacts
+            means, self._new = self._new, None
+            return means
         return self._runs.at(self.wearing.worn(volume))
 
     def scale(self, volume: np.ndarray) -> np.ndarray:
-        """Return the volumes (c,), m^3, by which contacts together change gap, play or a body's mass by all of it.
+        """Return the volumes (c,), m^3, for which contacts together double a gap or play, or remove a body.
 
-        inf for those that do not.
+        inf for contacts that change none of them.
         """
         scale, wearing = np.full(len(volume), np.inf), self.wearing
         lost = wearing.lost(volume)
-        known = np.isfinite(lost)
+        finite = np.isfinite(lost)
         for size, matrix in (
             (wearing.gaps(volume), wearing.gap), (wearing.plays(volume), wearing.play),
-            (1.0 - lost[known], wearing.losses[known]),
+            (1.0 - lost[finite], wearing.losses[finite]),
         ):  # fmt: skip
             opens = matrix > 0.0
-            own = np.nan_to_num(size, nan=1.0)[:, None] / opens.sum(axis=1, keepdims=True).clip(1)
+            scaled = np.nan_to_num(size, nan=1.0)[:, None] / opens.sum(axis=1, keepdims=True).clip(1)
             scale = np.minimum(
                 scale,
-                np.divide(own, matrix, out=np.full(matrix.shape, np.inf), where=opens).min(axis=0, initial=np.inf),
+                np.divide(scaled, matrix, out=np.full(matrix.shape, np.inf), where=opens).min(axis=0, initial=np.inf),
             )
         return scale
 
 
-def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[Found]]:
-    """Yield the moments, those between two steps as well where the threshold is passed."""
+def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[BandMeans]]:
+    """Yield the moments, with additional ones between two steps where the threshold is crossed."""
     table, threshold, before, damped = course.study.table, course.study.threshold, None, False
     steps = Steps(table.tolerance, table.reach, course.scale, table.steps)
     start = np.zeros(course.wearing.gap.shape[1])
@@ -153,24 +153,24 @@ def _moments(course: _Course, expected: _Expected) -> Iterator[Moment[Found]]:
             before = now
 
 
-def _worn_away(wearing: Wearing, last: Moment[Found]) -> tuple[float, int] | None:
-    """Return when a body is worn away at the rates of the last moment, h, and its number; None: never, or not known."""
-    rate, left = wearing.losses @ last.found.rate, 1.0 - wearing.lost(last.state)
-    spans = np.divide(left, rate, out=np.full(len(left), np.inf), where=np.isfinite(left) & (rate > 0.0))
+def _worn_away(wearing: WearEffect, last: Moment[BandMeans]) -> tuple[float, int] | None:
+    """Return when a body is worn away at the latest rates, h, and its number; None: never, or size unknown."""
+    rate, remaining = wearing.losses @ last.found.rate, 1.0 - wearing.lost(last.state)
+    spans = np.divide(remaining, rate, out=np.full(len(remaining), np.inf), where=np.isfinite(remaining) & (rate > 0.0))
     first = int(np.argmin(spans))
     return (last.time + float(spans[first]), first) if np.isfinite(spans[first]) else None
 
 
-def _passes(before: Moment[Found], after: Moment[Found], threshold: float) -> bool:
+def _passes(before: Moment[BandMeans], after: Moment[BandMeans], threshold: float) -> bool:
     return (before.found.reduction >= threshold) != (after.found.reduction >= threshold)
 
 
-def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Iterator[Moment[Found]]:
-    """Yield moments between two, until the time at which the reduction passes the threshold is known well enough.
+def _halved(course: _Course, before: Moment[BandMeans], after: Moment[BandMeans]) -> Iterator[Moment[BandMeans]]:
+    """Yield moments between two, until the time of crossing the threshold is accurate enough.
 
-    It is, too, where reductions differ by less than their confidence.
+    Halving also stops if reductions differ by less than their confidence.
     """
-    table, first, last, found = course.study.table, before, after, list[Moment[Found]]()
+    table, first, last, moments = course.study.table, before, after, list[Moment[BandMeans]]()
     while last.time - first.time > _CLOSE * table.hours:
         change = abs(last.found.reduction - first.found.reduction)
         if change < max(last.found.reduction_confidence, first.found.reduction_confidence):
@@ -178,20 +178,20 @@ def _halved(course: _Course, before: Moment[Found], after: Moment[Found]) -> Ite
         middle = (first.time + last.time) / 2
         volume, band = between(before, after, middle)
         moment = Moment(middle, volume, course.rates(volume), band, after.error)
-        found.append(moment)
+        moments.append(moment)
         first, last = (first, moment) if _passes(first, moment, course.study.threshold) else (moment, last)
-    yield from sorted(found, key=lambda moment: moment.time)
+    yield from sorted(moments, key=lambda moment: moment.time)
 
 
 def _record(
-    study: LifeStudy, wearing: Wearing, runs: Runs, moments: list[Moment[Found]], starts: dict[str, Any],
+    study: LifeStudy, wearing: WearEffect, runs: LifeRuns, moments: list[Moment[BandMeans]], starts: dict[str, Any],
     provenance: dict[str, Any],
 ) -> LifeRecord:  # fmt: skip
-    """Return the record of moments in the order of their times."""
+    """Return the record of moments in ascending time."""
     volume = np.array([moment.state for moment in moments])
     band, error = (np.array([getattr(moment, name) for moment in moments]) for name in ("band", "error"))
     rate, confidence = (np.array([getattr(m.found, name) for m in moments]) for name in ("rate", "confidence"))
-    area = np.array([one.area for one in runs.contacts])
+    area = np.array([contact.area for contact in runs.contacts])
     gap_rate = rate @ wearing.gap.T
     shift = np.sqrt(band**2 @ wearing.gap.T**2) + error @ wearing.gap.T
     travel = {
@@ -226,9 +226,9 @@ def _record(
 def _hours(
     time: np.ndarray, reduction: np.ndarray, band: np.ndarray, late: np.ndarray, threshold: float
 ) -> tuple[float | None, float | None, float | None]:
-    """Return when the reduction is lost: of its curve, at the earliest and at the latest; None: not within the time.
+    """Return the time when the reduction is lost: nominal, earliest and latest; None: not within the hours.
 
-    0 where it is never kept. late (n,): h by which the depths of wear may be early or late.
+    0 if it is never reached. late (n,): uncertainty of the depths of wear as a time, h.
     """
     lost, early, last = (_lost(time, reduction - threshold + side * band) for side in (0.0, -1.0, 1.0))
     if early is not None:
@@ -237,13 +237,13 @@ def _hours(
 
 
 def _lost(time: np.ndarray, above: np.ndarray) -> float | None:
-    """Return the first time at which a curve that has been above zero falls below it."""
-    kept = np.flatnonzero(above >= 0.0)
-    if len(kept) == 0:
+    """Return the first time at which a curve falls below zero after being above it."""
+    reached = np.flatnonzero(above >= 0.0)
+    if len(reached) == 0:
         return 0.0
-    below = np.flatnonzero(above[kept[0] :] < 0.0)
+    below = np.flatnonzero(above[reached[0] :] < 0.0)
     if len(below) == 0:
         return None
-    after = kept[0] + below[0]
-    part = above[after - 1] / (above[after - 1] - above[after])
-    return float(time[after - 1] + part * (time[after] - time[after - 1]))
+    after = reached[0] + below[0]
+    fraction = above[after - 1] / (above[after - 1] - above[after])
+    return float(time[after - 1] + fraction * (time[after] - time[after - 1]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.response.contact_work import contact_name
 from vanedamp.files.record import Array, Record
-from vanedamp.studies.life.study import Contact, LifeStudy
+from vanedamp.studies.life.study import LifeStudy, WearContact
 from vanedamp.studies.worst_start import worst_words
 
 _Moments = Annotated[np.ndarray, Array(("time",))]
@@ -25,7 +25,7 @@ class LifeRecord(Record):
     """the [life] table and the scene, as plain data"""
     reference: float
     """amplitude without bodies in the band: its maximum, or its mean [m]; or the limit of the measure, in its unit"""
-    contacts: tuple[Contact, ...]
+    contacts: tuple[WearContact, ...]
     """that wear: body, side and corner, area of the patch, fraction of the cavity"""
     frequency: Annotated[np.ndarray, Array(("frequency",), "Hz")]
     """of the band"""
@@ -72,20 +72,20 @@ class LifeRecord(Record):
 
     def labels(self) -> dict[str, Any]:
         """Return the names of the contacts."""
-        return {"contact": [one.name for one in self.contacts]}
+        return {"contact": [contact.name for contact in self.contacts]}
 
     def derived(self) -> dict[str, Any]:
         """Return the contacts by the names of their parts."""
-        return {"contacts": [one._asdict() for one in self.contacts]}
+        return {"contacts": [contact._asdict() for contact in self.contacts]}
 
     @property
     def faces(self) -> dict[str, list[int]]:
         """Contacts of each face with a known patch, by its name: a face wears by the mean of its contacts."""
-        found: dict[str, list[int]] = {}
-        for place, one in enumerate(self.contacts):
-            if np.isfinite(one.area):
-                found.setdefault(contact_name(one.damper, one.side), []).append(place)
-        return found
+        faces: dict[str, list[int]] = {}
+        for index, contact in enumerate(self.contacts):
+            if np.isfinite(contact.area):
+                faces.setdefault(contact_name(contact.damper, contact.side), []).append(index)
+        return faces
 
     def rows(self) -> Iterator[tuple[str, ...]]:
         """Yield the table over hours: time, gaps with band, reduction with band."""
@@ -120,21 +120,21 @@ def _hours_of(
     (lost, early, late), table, quantity = hours, study.table, study.measure.quantity
     first, last = values["reduction"][0], values["reduction"][-1]
     least = f"{study.threshold:.0%}"
-    keeps, keep, left = "Damps", f"damp by {least}", "reduction"
+    keeps, keep, label = "Damps", f"damp by {least}", "reduction"
     if table.limit is not None:
         limit = f"{table.measure} below {table.limit:g} {quantity.unit}".removesuffix(" 1")
-        keeps, keep, left, least = f"Keeps {limit}", f"keep {limit}", "margin", "0"
+        keeps, keep, label, least = f"Keeps {limit}", f"keep {limit}", "margin", "0"
     if worn is not None:
         doubt = "" if lost is None else f", and does not {keep} before"
         return (
-            f"Body {worn[1]} is worn away after {worn[0]:.0f} h{doubt}: the {left} is {first:.0%} as new and "
+            f"Body {worn[1]} is worn away after {worn[0]:.0f} h{doubt}: the {label} is {first:.0%} as new and "
             f"{last:.0%} at the end"
         )
     if lost == 0.0:
-        return f"Does not {keep} at any time in {table.hours:g} h: {left} {first:.0%} as new, {last:.0%} at the end"
+        return f"Does not {keep} at any time in {table.hours:g} h: {label} {first:.0%} as new, {last:.0%} at the end"
     if lost is None:
         doubt = "" if early is None else f", from {early:.0f} h on without certainty"
-        return f"{keeps} for all {table.hours:g} h{doubt}: the {left} is {first:.0%} as new and {last:.0%} at the end"
+        return f"{keeps} for all {table.hours:g} h{doubt}: the {label} is {first:.0%} as new and {last:.0%} at the end"
     until = f"more than {values['time'][-1]:.0f}" if late is None else f"{late:.0f}"
     begin = "" if first >= study.threshold else f" once worn in (as new {first:.0%})"
-    return f"{keeps} for {lost:.0f} h ({early or 0.0:.0f} to {until} h){begin}: then the {left} falls below {least}"
+    return f"{keeps} for {lost:.0f} h ({early or 0.0:.0f} to {until} h){begin}: then the {label} falls below {least}"

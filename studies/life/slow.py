@@ -1,9 +1,9 @@
-"""Integration of rates that are known with a confidence: what wears over hours, by means of a fast motion.
+"""Integration of rates with confidence intervals: slow wear driven by a fast motion.
 
 The pair of P. Bogacki and L. F. Shampine (Appl. Math. Lett. 2, 321, 1989), third order with an embedded second. A
-library's integrator (scipy's RK23 is the same pair) takes the scatter of such rates for the error of its step: scatter
-falls with the step itself, and not with its cube, so that steps shrink until the integration stops; nor does it return
-how far the scatter has carried the result. Here only what exceeds the scatter's own confidence counts as error.
+library's integrator (scipy's RK23 is the same pair) mistakes the scatter of such rates for step error: scatter
+decreases only linearly with the step, so that steps shrink until the integration stops; nor does it return
+the uncertainty of the result. Here only differences beyond the confidence interval count as step error.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import numpy as np
 STAGES = ((0.5,), (0.0, 0.75), (2 / 9, 1 / 3, 4 / 9))
 _WEIGHTS = np.array(STAGES[-1])
 _ERROR = np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
-#: growth of a step at most and at least, and by how much it stays below what its error allows
+#: largest and smallest growth of a step, and safety factor on the permitted error
 _GROWTH, _SHRINK, _SAFETY = 3.0, 0.2, 0.85
-#: shortest step over the whole time: a jump of the rates is passed by it
+#: shortest step relative to the whole time, with which jumps of the rates are crossed
 _SHORTEST = 1e-3
 
 
@@ -35,11 +35,11 @@ class Rated(Protocol):
         """Half widths (k,)."""
 
 
-Found = TypeVar("Found", bound=Rated)
+Rates = TypeVar("Rates", bound=Rated)
 
 
-class Moment(NamedTuple, Generic[Found]):
-    """A state (k,) at a time, what was found there, and how well it is known.
+class Moment(NamedTuple, Generic[Rates]):
+    """A state (k,) at a time, its rates, and its uncertainty.
 
     band: (k,) half widths of 95 % intervals, by the confidence of the rates; error: (k,) bound of the steps' errors, as
     estimated by the second order.
@@ -47,7 +47,7 @@ class Moment(NamedTuple, Generic[Found]):
 
     time: float
     state: np.ndarray
-    found: Found
+    found: Rates
     band: np.ndarray
     error: np.ndarray
 
@@ -55,8 +55,8 @@ class Moment(NamedTuple, Generic[Found]):
 class Steps(NamedTuple):
     """Control of the steps.
 
-    tolerance: of the error at the end, over the scale; reach: growth in a step at most, over the scale; scale: of a
-    state (k,), that of its errors and growth (inf: none); fixed: number of equal steps in place of the control.
+    tolerance: error at the end relative to the scale; reach: largest growth per step relative to the scale; scale: of a
+    state (k,), for errors and growth (inf: no limit); fixed: number of equal steps instead of the control.
     """
 
     tolerance: float
@@ -66,11 +66,11 @@ class Steps(NamedTuple):
 
 
 def integrate(
-    rates: Callable[[np.ndarray], Found], state: np.ndarray, end: float, steps: Steps
-) -> Iterator[Moment[Found]]:
+    rates: Callable[[np.ndarray], Rates], state: np.ndarray, end: float, steps: Steps
+) -> Iterator[Moment[Rates]]:
     """Yield the moments from time 0 to the end, the first and the last included."""
     zero = np.zeros(len(state))
-    now: Moment[Found] = Moment(0.0, state, rates(state), zero, zero)
+    now: Moment[Rates] = Moment(0.0, state, rates(state), zero, zero)
     yield now
     step = _longest(now, end, steps) if steps.fixed is None else end / steps.fixed
     while now.time < end * (1.0 - 1e-12):
@@ -92,8 +92,8 @@ def integrate(
             step = max(step, _SHORTEST * end)
 
 
-def between(before: Moment[Found], after: Moment[Found], time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return state and band (k,) at a time between two moments: the cubic by both rates, and between the bands."""
+def between(before: Moment[Rates], after: Moment[Rates], time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return state and band (k,) between two moments: Hermite interpolation of states, linear of bands."""
     span = after.time - before.time
     s = (time - before.time) / span
     change = after.state - before.state
@@ -102,10 +102,10 @@ def between(before: Moment[Found], after: Moment[Found], time: float) -> tuple[n
     return state, (1 - s) * before.band + s * after.band
 
 
-def steps_left(now: Moment[Found], until: float, step: float, steps: Steps) -> int:
-    """Return about how many steps like the last one (0: none yet) lead from a moment to a time.
+def steps_left(now: Moment[Rates], until: float, step: float, steps: Steps) -> int:
+    """Return the approximate number of steps from a moment to a time. step: the last one (0: none yet).
 
-    Its rates stay, so that scales, and the steps with them, grow by the same factor each time.
+    Rates are taken as constant, so that scales and steps grow by the same factor each time.
     """
     span, fastest = until - now.time, _fastest(now, steps)
     step = step or _longest(now, span, steps)
@@ -116,28 +116,28 @@ def steps_left(now: Moment[Found], until: float, step: float, steps: Steps) -> i
     return int(np.ceil(np.log1p(span * fastest) / np.log1p(min(step * fastest, steps.reach))))
 
 
-def _fastest(now: Moment[Found], steps: Steps) -> float:
-    """Return the growth of the states per unit of time, over their scales, at most."""
+def _fastest(now: Moment[Rates], steps: Steps) -> float:
+    """Return the largest growth of the states per unit of time, relative to their scales."""
     return float(np.max(np.abs(now.found.rate) / steps.scale(now.state), initial=0.0))
 
 
-def _longest(now: Moment[Found], end: float, steps: Steps) -> float:
-    """Return the step in which no state grows by more than its reach."""
+def _longest(now: Moment[Rates], end: float, steps: Steps) -> float:
+    """Return the longest step in which no state grows by more than the reach."""
     fastest = _fastest(now, steps)
     return min(end, steps.reach / fastest) if fastest > 0.0 else end
 
 
-def _step(rates: Callable[[np.ndarray], Found], now: Moment[Found], step: float) -> tuple[Moment[Found], np.ndarray]:
-    """Return the moment after a step, and by how much its error exceeds the confidence of the rates (k,)."""
-    found = [now.found]
+def _step(rates: Callable[[np.ndarray], Rates], now: Moment[Rates], step: float) -> tuple[Moment[Rates], np.ndarray]:
+    """Return the moment after a step, and the excess (k,) of its error over the confidence of the rates."""
+    evaluated = [now.found]
     for weights in STAGES:
-        slope = sum(weight * one.rate for weight, one in zip(weights, found, strict=True))
+        slope = sum(weight * stage.rate for weight, stage in zip(weights, evaluated, strict=True))
         state = now.state + step * slope
-        found.append(rates(state))
-    rate, scatter = (np.array([getattr(one, name) for one in found]) for name in ("rate", "confidence"))
+        evaluated.append(rates(state))
+    rate, scatter = (np.array([getattr(stage, name) for stage in evaluated]) for name in ("rate", "confidence"))
     error = step * np.abs(_ERROR @ rate)
     excess = np.maximum(error - step * np.sqrt(_ERROR**2 @ scatter**2), 0.0)
-    # what shifts the motion in time goes on with its rate, which solves the linearised equation
-    kept = np.divide(rate[-1], rate[0], out=np.ones(len(state)), where=rate[0] > 0.0)
-    band = np.sqrt((kept * now.band) ** 2 + step**2 * (_WEIGHTS**2 @ scatter[:-1] ** 2))
-    return Moment(now.time + step, state, found[-1], band, np.abs(kept) * now.error + excess), excess
+    # a shift in time grows in proportion to the rate, which solves the linearised equation
+    ratio = np.divide(rate[-1], rate[0], out=np.ones(len(state)), where=rate[0] > 0.0)
+    band = np.sqrt((ratio * now.band) ** 2 + step**2 * (_WEIGHTS**2 @ scatter[:-1] ** 2))
+    return Moment(now.time + step, state, evaluated[-1], band, np.abs(ratio) * now.error + excess), excess

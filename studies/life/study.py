@@ -1,4 +1,4 @@
-"""The study of a life: a scene with [wear], and a [life] table of hours, frequencies and the reduction to keep."""
+"""The study of a life: a scene with [wear], and a [life] table with hours, frequencies and the required reduction."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from vanedamp.studies.band import Band, drive, file_in, placed, reference_amplit
 from vanedamp.studies.measure import AMPLITUDES, Measure
 from vanedamp.studies.worst_start import STARTS
 
-#: about how often a life is evaluated over its band
+#: approximate number of evaluations of the band
 _EVALUATIONS = 20
-#: how often the spacing of a band is halved about its worst point
+#: number of times that the spacing of a band is halved around its worst point
 HALVINGS = 3
 _Ratio = Annotated[Real, Field(gt=0, lt=1)]
 
@@ -81,7 +81,7 @@ class LifeFile(Scene):
     """hours of operation and the reduction to keep"""
 
 
-class Contact(NamedTuple):
+class WearContact(NamedTuple):
     """A contact that wears: body, side and corner as of an Event; patch, m^2 (nan: unknown); share of the cavity."""
 
     damper: int
@@ -97,7 +97,7 @@ class Contact(NamedTuple):
 
 
 class LifeStudy(NamedTuple):
-    """A scene, its [life] table, and what its curves refer to.
+    """A scene, its [life] table, and the reference of its curves.
 
     frequencies: (f,) Hz of the band. reference: amplitude without bodies in the band, m, or the limit of what counts.
     """
@@ -115,7 +115,7 @@ class LifeStudy(NamedTuple):
 
     @classmethod
     def of(cls, tables: Mapping[str, Any], path: str | Path = "study") -> LifeStudy:
-        """Return the study in the tables of a TOML file that lies at `path`, which errors name. Raises InputError."""
+        """Return the study in the tables of a TOML file; errors name its `path`. Raises InputError."""
         file = file_in(LifeFile, tables, "life", "give hours and a band in a [life] table (docs/wear.md)", path)
         try:
             scene, band = placed(scene_in(file), file.life)
@@ -142,7 +142,7 @@ class LifeStudy(NamedTuple):
 
     @property
     def refines(self) -> bool:
-        """Whether the worst point is sought between those of the band, too: not where these are listed."""
+        """Whether the worst point is also sought between the points of the band: not if these are a list."""
         spaced = isinstance(getattr(self.table, self.table.key), Range) and len(self.frequencies) > 1
         return spaced and (self.table.over_band == "worst" or self.table.dwell == "peak")
 
@@ -153,17 +153,17 @@ class LifeStudy(NamedTuple):
 
     @property
     def runs(self) -> int:
-        """About how many runs a life takes."""
+        """Approximate number of runs of a life."""
         return _EVALUATIONS * self.each + self.starts
 
-    def wearing(self, contacts: Sequence[Contact]) -> Wearing:
-        """Return how the scene wears at its contacts.
+    def wearing(self, contacts: Sequence[WearContact]) -> WearEffect:
+        """Return the effect of wear at contacts on the scene.
 
-        Raises InputError for a contact that opens a gap and whose patch is not known.
+        Raises InputError for a contact that opens a gap and has no known patch.
         """
         scene = self.scene
-        gap, play = opening(scene, [(one.damper, one.side) for one in contacts])
-        area = np.array([one.area for one in contacts])
+        gap, play = opening(scene, [(contact.damper, contact.side) for contact in contacts])
+        area = np.array([contact.area for contact in contacts])
         for contact in np.flatnonzero(np.isnan(area) & np.any(gap + play > 0.0, axis=0)):
             damper, side, *_ = contacts[contact]
             extent = "height" if side in ALONG else "length"
@@ -172,18 +172,18 @@ class LifeStudy(NamedTuple):
                 "the body (damper or wear), or wear.area, m^2"
             )
         area = np.where(np.isnan(area), 1.0, area)
-        return Wearing(scene, gap / area, play / area, body_shares(scene, contacts))
+        return WearEffect(scene, gap / area, play / area, body_shares(scene, contacts))
 
     def points(self, scene: Scene, frequencies: Sequence[float]) -> list[Scene]:
         """Return a scene at some frequencies (f,), Hz."""
-        made = Points(scene)
-        return [made.scene(drive(scene, float(frequency))) for frequency in frequencies]
+        points = Points(scene)
+        return [points.scene(drive(scene, float(frequency))) for frequency in frequencies]
 
 
-class Wearing(NamedTuple):
-    """How volumes of wear (c,), m^3, change a scene: gaps and plays by matrices (cavities, c), 1/m^2.
+class WearEffect(NamedTuple):
+    """Effect of volumes of wear (c,), m^3, on a scene: gaps and plays grow by matrices (cavities, c), 1/m^2.
 
-    shares: (bodies, c) of the volumes that the bodies lose.
+    shares: (bodies, c) fraction of each volume that a body loses.
     """
 
     scene: Scene
@@ -201,14 +201,14 @@ class Wearing(NamedTuple):
 
     @property
     def losses(self) -> np.ndarray:
-        """Fractions (bodies, c) of each body per volume of wear, 1/m^3; nan where its size is not known."""
-        found: np.ndarray = self.shares / body_volumes(self.scene)[:, None]
-        return found
+        """Fractions (bodies, c) of each body lost per volume of wear, 1/m^3; nan if its size is unknown."""
+        fractions: np.ndarray = self.shares / body_volumes(self.scene)[:, None]
+        return fractions
 
     def lost(self, volume: np.ndarray) -> np.ndarray:
-        """Return the fraction of each body that is worn away; nan where its size is not known."""
-        found: np.ndarray = self.losses @ volume
-        return found
+        """Return the worn fraction of each body; nan if its size is unknown."""
+        fractions: np.ndarray = self.losses @ volume
+        return fractions
 
     def worn(self, volume: np.ndarray) -> Scene:
         """Return the scene with its gaps, plays and masses after some wear."""

@@ -1,4 +1,4 @@
-"""Pipelines: the stages from a case to a report, of which only those run whose inputs have changed."""
+"""Pipelines: stages from a case to a report; only stages with changed inputs run."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from vanedamp.studies.pipeline.tables import PipelineFile
 
 @dataclass(frozen=True)
 class StageResult:
-    """What became of a stage.
+    """The outcome of a stage.
 
     status   "kept": nothing has changed, "done"; of a dry run "runs", or "perhaps": if its inputs change
-    reasons  why it is not kept
+    reasons  for running it
     found    its result, in one line
     outputs  its files
     """
@@ -41,7 +41,7 @@ class StageResult:
 
 @dataclass(frozen=True, repr=False)
 class PipelineResult(Displayed):
-    """What became of the stages of a pipeline, in their order."""
+    """The outcome of the stages of a pipeline, in their order."""
 
     stages: tuple[StageResult, ...]
     wall_time_s: float
@@ -70,7 +70,7 @@ def pipeline(
     the results, so that a killed run resumes, jobs from their checkpoints.
 
     folder: of the results, by default the one that the file names; workers: processes of jobs, by default one for
-    every core; dry_run: only say what would run; note: takes a line as stages begin and end. Raises InputError, with
+    every core; dry_run: name what would run; note: prints a line as stages begin and end. Raises InputError, with
     the stage's file: nothing has run then if the file, the case or a scene is bad, or would take a month.
     """
     started = time.perf_counter()
@@ -98,7 +98,7 @@ def pipeline(
 
 
 def adopt(path: str | Path) -> None:
-    """Note that results in the folder of a pipeline file match its inputs as they are: made by other means."""
+    """Record that results in the folder of a pipeline file match its present inputs, if made by other means."""
     table, source = PipelineFile.load(path), Path(path)
     folder = source.parent / table.folder
     record = PipelineRecord(folder / f"{source.stem}.record.json")
@@ -120,11 +120,11 @@ def _done(
     same = record.begin(stage.name, inputs)
     started = time.perf_counter()
     tools = Tools(lambda line: say(f"{stage.name}: {line}"), pool, not same, record.inputs(stage.name, stage.outputs))
-    found = stage.work(tools)
+    words = stage.work(tools)
     seconds = time.perf_counter() - started
     record.end(stage.name, inputs, stage.outputs)
-    say(f"{stage.name}: {found} ({seconds:.1f} s)")
-    return StageResult(stage.name, "done", reasons, outputs, found, seconds)
+    say(f"{stage.name}: {words} ({seconds:.1f} s)")
+    return StageResult(stage.name, "done", reasons, outputs, words, seconds)
 
 
 def _plan(listed: Sequence[Stage], record: PipelineRecord, say: Callable[[str], None]) -> list[StageResult]:
@@ -147,26 +147,26 @@ def _plan(listed: Sequence[Stage], record: PipelineRecord, say: Callable[[str], 
 
 
 def _check(listed: Sequence[Stage], files: Iterable[str | Path], source: Path, workers: int) -> None:
-    """Reject bad input before anything runs, and results that would take the place of an input."""
+    """Reject bad input before anything runs, and results that would overwrite an input."""
     inputs = {(source.parent / file).resolve() if file != source else source.resolve() for file in files}
-    made: dict[Path, str] = {}
+    owners: dict[Path, str] = {}
     for stage in listed:
         with _located(stage):
             inputs |= {Path(file).resolve() for file in stage.check(workers)}
         for path in stage.outputs:
-            if path in made:
+            if path in owners:
                 raise InputError(
-                    f"{source}: {made[path]} and {stage.name} both write {path.name}; give one of them another name"
+                    f"{source}: {owners[path]} and {stage.name} both write {path.name}; give one of them another name"
                 )
-            made[path] = stage.name
-    taken = {path for stage in listed for path in stage.takes}
-    for path, name in made.items():
-        if path in inputs - taken:
+            owners[path] = stage.name
+    intermediate = {path for stage in listed for path in stage.takes}
+    for path, name in owners.items():
+        if path in inputs - intermediate:
             raise InputError(f"{source}: {name} writes {path.name}, which is an input; give another folder or name")
 
 
 def _keep_edited(listed: Sequence[Stage], record: PipelineRecord) -> None:
-    """Reject overwriting a case or a scene that somebody has edited; other results are made again."""
+    """Reject overwriting a case or scene that was edited by hand; other results are made again."""
     for stage in listed:
         for path in record.edited(stage.name, [path for path in stage.outputs if path.suffix == ".toml"]):
             raise InputError(

@@ -1,4 +1,4 @@
-"""What was done, in a file in their folder: from what each stage made which files, and what has changed since."""
+"""Record of a pipeline in the folder of its results: inputs and outputs of each stage, and changes since then."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _KIND = "vanedamp pipeline"
 #: changes of one file that are reported, and entries of a list
 _MOST, _ENTRIES = 3, 4
 
-#: what decides about doing a stage again: by subject ("case case.toml", "file cluster.msh"), nested data or a digest
+#: inputs that decide whether a stage runs again: by subject ("case case.toml", "file cluster.msh"), data or a digest
 Inputs = Mapping[str, Any]
 
 
@@ -38,36 +38,36 @@ class PipelineRecord:
             if data["kind"] != _KIND:
                 raise ValueError(f"kind {data['kind']}")
             self._begun = dict(data["begun"])
-            self._done = {name: {key: dict(made[key]) for key in ("inputs", "outputs")}
-                          for name, made in data["done"].items()}  # fmt: skip
+            self._done = {name: {key: dict(entry[key]) for key in ("inputs", "outputs")}
+                          for name, entry in data["done"].items()}  # fmt: skip
 
     def reasons(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> list[str]:
-        """Return why a stage must run; nothing if its results match these inputs."""
+        """Return the reasons for running a stage; none if its results match these inputs."""
         done = self._done.get(name)
         if done is None:
             return ["not done so far"]
         return list(changes(done["inputs"], plain(inputs))) + list(_lost(done["outputs"], outputs))
 
     def inputs(self, name: str, outputs: Sequence[Path]) -> Inputs | None:
-        """Return the inputs that a stage's outputs were made of; None unless they are as it made them."""
+        """Return the inputs from which a stage's outputs were made; None if the outputs have been changed."""
         done = self._done.get(name)
         return None if done is None or any(_lost(done["outputs"], outputs)) else done["inputs"]
 
     def edited(self, name: str, outputs: Sequence[Path]) -> list[Path]:
-        """Return the outputs of a stage that are not as it made them, of those that it has made."""
-        made = self._done.get(name, {"outputs": {}})["outputs"]
-        return [path for path in outputs if made.get(path.name) and path.exists() and digest(path) != made[path.name]]
+        """Return the outputs of a stage that were changed since it wrote them."""
+        sums = self._done.get(name, {"outputs": {}})["outputs"]
+        return [path for path in outputs if sums.get(path.name) and path.exists() and digest(path) != sums[path.name]]
 
     def begin(self, name: str, inputs: Inputs) -> bool:
-        """Note that a stage begins. Returns whether what an earlier start left is of the same inputs, or unknown."""
+        """Record the start of a stage. Returns whether files of an earlier start fit the inputs, or are unknown."""
         mine = plain(inputs)
-        same = self._begun.get(name, mine) == mine
+        matches = self._begun.get(name, mine) == mine
         self._begun[name] = mine
         self._write()
-        return same
+        return matches
 
     def end(self, name: str, inputs: Inputs, outputs: Sequence[Path]) -> None:
-        """Note that a stage has made its outputs."""
+        """Record that a stage has written its outputs."""
         files = {path.name: digest(path) if path.exists() else None for path in outputs}
         self._done[name] = {"inputs": plain(inputs), "outputs": files}
         self._begun.pop(name, None)
@@ -78,13 +78,13 @@ class PipelineRecord:
 
 
 def plain(inputs: Inputs) -> dict[str, Any]:
-    """Return inputs as they come back from the file."""
+    """Return inputs in the form in which the file returns them."""
     data: dict[str, Any] = json.loads(json.dumps(inputs, default=str))
     return data
 
 
 def changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what differs between two inputs of a stage, a line a subject."""
+    """Yield the differences between two inputs of a stage, one line per subject."""
     for subject in dict.fromkeys([*new, *old]):
         before, after = old.get(subject), new.get(subject)
         if before == after:
@@ -100,7 +100,7 @@ def changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
 
 
 def leaves(data: Any, path: str = "") -> dict[str, Any]:
-    """Return the values of nested data by their dotted paths; of a list of tables by their names or indices."""
+    """Return the values of nested data by dotted paths; tables in lists go by names or indices."""
     items: list[tuple[str, Any]]
     if isinstance(data, dict) and data:
         items = list(data.items())
@@ -113,20 +113,20 @@ def leaves(data: Any, path: str = "") -> dict[str, Any]:
     }
 
 
-def _lost(made: Mapping[str, str | None], outputs: Sequence[Path]) -> Iterator[str]:
-    """Yield which outputs are not as they were made; a digest of None: the stage had none to write."""
+def _lost(digests: Mapping[str, str | None], outputs: Sequence[Path]) -> Iterator[str]:
+    """Yield outputs that were changed; a digest of None: the stage did not write the file."""
     for path in outputs:
-        if path.name not in made:
+        if path.name not in digests:
             yield f"{path.name} is new"
         elif not path.exists():
-            if made[path.name] is not None:
+            if digests[path.name] is not None:
                 yield f"{path.name} is missing"
-        elif digest(path) != made[path.name]:
+        elif digest(path) != digests[path.name]:
             yield f"{path.name} is not as it was made"
 
 
 def _pair(before: Any, after: Any) -> str:
-    """Return two values that differ as text, in as many digits as it takes."""
+    """Return two different values as text, with enough digits to tell them apart."""
     shown = ((_shown(before, digits), _shown(after, digits)) for digits in (".6g", ".9g", ".12g", "r"))
     one, other = next(pair for pair in shown if pair[0] != pair[1])
     return f"{one} -> {other}"

@@ -1,4 +1,4 @@
-"""The stages of a pipeline: what each reads, what decides about doing it again, and how it is done."""
+"""The stages of a pipeline: what each reads, when it runs again, and how."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ from vanedamp.studies.pipeline.tables import (
 )
 from vanedamp.studies.scene_checks import check_model
 
-#: tables of a scene that one job reads
+#: tables of a scene that only one job reads
 _OF_JOBS = {"sweep": "sweep", "orbits": "orbit", "ramp": "ramp", "ringdown": "ring_down"}
-#: keys of the rigid model that a scene takes
+#: keys of the rigid model that scenes use
 _RIGID = ("mass", "stiffness", "damping_ratio", "base_mass")
-#: the model of a structure that the pipeline gives, and the keys of the scene's own that it replaces
+#: the model of the structure from the pipeline, and the scene's keys that it replaces
 _MODELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "rigid": ("rigid", (*_RIGID, "damping")),
     "reduced": ("rom", ("file",)),
 }
-#: the level of a scene, which `level` replaces
+#: keys of the level of a scene, which `level` replaces
 _LEVELS = ("force", "base_acceleration", "resonance_amplitude", "load_factor")
-#: the rigid model and the reduced one before they are made, to check a scene with
+#: placeholder of the rigid model before it exists, to check a scene
 _ANY_RIGID = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.01}
 _DOLFINX = ("fenics-dolfinx", "dolfinx-solver-real")
 
@@ -58,9 +58,9 @@ _DOLFINX = ("fenics-dolfinx", "dolfinx-solver-real")
 class Tools:
     """The inputs of a stage's work.
 
-    note: takes a line for the user, to which it adds the stage's name; pool: returns the worker processes, started when
-    first asked for; fresh: what an earlier start left is of other inputs; made_of: the inputs of the outputs that are
-    there, if they are as the stage made them.
+    note: prints a line with the stage's name; pool: returns the worker processes, started when
+    first used; fresh: files of an earlier start belong to other inputs; made_of: the inputs of existing outputs,
+    if these are unchanged.
     """
 
     note: Callable[[str], None]
@@ -78,10 +78,10 @@ class Tools:
 class Stage(ABC):
     """One step.
 
-    name     as lines and records call it
+    name     in printed lines and records
     file     that its errors are about
     outputs  files that it writes
-    takes    outputs of earlier stages that it reads
+    takes    outputs of earlier stages, its inputs
     """
 
     #: options that name the outputs of its job
@@ -98,11 +98,11 @@ class Stage(ABC):
 
     @abstractmethod
     def inputs(self) -> dict[str, Any]:
-        """Return what decides about doing it again (record.Inputs). Products that are not there yet are left out."""
+        """Return the inputs that decide whether it runs again (record.Inputs). Missing products are left out."""
 
     @abstractmethod
     def work(self, tools: Tools) -> str:
-        """Do it, and return the result in one line. Raises VanedampError."""
+        """Run it, and return the result in one line. Raises VanedampError."""
 
     def _run(self, job: Job, tools: Tools) -> str:
         """Run a job, with its checkpoint in the folder of the results, and write its files; as `work`."""
@@ -131,22 +131,22 @@ class CaseStage(Stage):
     CALIBRATION_KEYS: ClassVar[Sequence[str] | None] = ()
 
     def check(self, workers: int) -> Iterable[str | Path]:
-        """Check the case, which a tuned one does not differ from but in numbers."""
+        """Check the case; a tuned case differs only in numbers."""
         return [] if self.takes else [self.file, *self._checked().files]
 
     def _checked(self) -> Case:
         return Case.load(self.file)
 
     def inputs(self) -> dict[str, Any]:
-        """Return the case's tables without other stages', and the files that it names."""
+        """Return the case's tables without those of other stages, and the files that it names."""
         if not self.file.exists():
             return {}
         tables, case = read_toml(self.file), Case.load(self.file)
         tables.pop("campbell", None)
         if self.CALIBRATION_KEYS is not None:
             case, measured = replace(case, calibration=None), tables.pop("calibration", {})
-            kept = {key: measured[key] for key in self.CALIBRATION_KEYS if key in measured}
-            tables |= {"calibration": kept} if self.CALIBRATION_KEYS else {}
+            calibration = {key: measured[key] for key in self.CALIBRATION_KEYS if key in measured}
+            tables |= {"calibration": calibration} if self.CALIBRATION_KEYS else {}
         return {f"case {self.file.name}": tables} | _digests(case.files, self.file.parent) | _software(*_DOLFINX)
 
 
@@ -175,8 +175,8 @@ class Modal(CaseStage):
         from vanedamp.studies.case.stages import assemble, modal_analysis, set_level
 
         case, now = Case.load(self.file), plain(self.inputs())
-        same = tools.made_of is not None and _without_level(tools.made_of) == _without_level(now)
-        if same and (level := set_level(self.outputs[0], case)) is not None:
+        same_modes = tools.made_of is not None and _without_level(tools.made_of) == _without_level(now)
+        if same_modes and (level := set_level(self.outputs[0], case)) is not None:
             tools.warn(level_warnings(level.to_json()))
             return "modes kept, only the amplitude at the fatigue strength is new"
         analysis = modal_analysis(assemble(case))
@@ -198,9 +198,9 @@ class Reduce(CaseStage):
         return case
 
     def inputs(self) -> dict[str, Any]:
-        """Return the case's inputs and the options, without those of the fatigue level, which sweeps take elsewhere.
+        """Return the case's inputs and the options, without the fatigue level, which sweeps read elsewhere.
 
-        Strengths are in a model with its hot spots only.
+        Only a model with hot spots depends on strengths.
         """
         return _without_level(super().inputs(), self.table.hot_spots > 0) | {"option": asdict(self.table)}
 
@@ -265,18 +265,18 @@ class OnScene(Stage):
     OPTIONS = ("output", "peak")
 
     def check(self, workers: int) -> Iterable[str | Path]:
-        """Check the scene, on any structure of the kind where its own is not made yet."""
+        """Check the scene, with a placeholder for a structure that does not exist yet."""
         if self.file in self.takes:
             return []
         kind = self._class()
         scene = kind.FILE.of(self._tables(_ANY_RIGID, 1e-6), self.file)
-        made = {path.resolve() for path in self.takes}
-        if self.table.structure is None and not made:
+        products = {path.resolve() for path in self.takes}
+        if self.table.structure is None and not products:
             check_model(scene)
-        # a study measures its model, which may be made later
-        if issubclass(kind, SceneJob) or (self.table.structure is None and not made):
+        # a study evaluates its model, which may not exist yet
+        if issubclass(kind, SceneJob) or (self.table.structure is None and not products):
             self._job(_ANY_RIGID, 1e-6).check(workers)
-        return [self.file, *(file for file in scene.files if Path(file).resolve() not in made)]
+        return [self.file, *(file for file in scene.files if Path(file).resolve() not in products)]
 
     def inputs(self) -> dict[str, Any]:
         """Return the scene, its changes by the pipeline, and the files that it names."""
@@ -287,14 +287,14 @@ class OnScene(Stage):
         for table in {*_OF_JOBS.values()} - {_OF_JOBS.get(self.kind)}:
             tables.pop(table, None)
         options = [key for key in ("structure", "level", "peak") if hasattr(self.table, key)]
-        given: dict[str, Any] = {"option": {key: getattr(self.table, key) for key in options}}
+        changes: dict[str, Any] = {"option": {key: getattr(self.table, key) for key in options}}
         if self.table.structure == "rigid":
-            given["rigid model"] = rigid
+            changes["rigid model"] = rigid
         if self.table.level is not None:
-            given["fatigue level"] = {"amplitude": amplitude}
+            changes["fatigue level"] = {"amplitude": amplitude}
         there = (rigid or self.table.structure != "rigid") and (amplitude is not None or self.table.level is None)
         files = self._class().FILE.of(self._tables(rigid, amplitude), self.file).files if there else []
-        return {f"scene {self.file.name}": tables} | given | _digests(files, self.file.parent) | _software()
+        return {f"scene {self.file.name}": tables} | changes | _digests(files, self.file.parent) | _software()
 
     def work(self, tools: Tools) -> str:
         """Run it."""
@@ -305,16 +305,16 @@ class OnScene(Stage):
 
     def _class(self) -> type[SceneJob | StudyJob]:
         module, _, name = JOBS[self.kind].partition(":")
-        found: type[SceneJob | StudyJob] = getattr(import_module(f"vanedamp.studies.jobs.{module}"), name)
-        return found
+        job_class: type[SceneJob | StudyJob] = getattr(import_module(f"vanedamp.studies.jobs.{module}"), name)
+        return job_class
 
     def _job(self, rigid: dict[str, Any], amplitude: float | None) -> SceneJob | StudyJob:
-        """Return the job on the structure and at the level that the pipeline gives."""
+        """Return the job with the structure and the level of the pipeline."""
         options = dict(zip(self.OPTIONS[1:], (path.name for path in self.outputs[1:]), strict=False))
         return self._class().of_tables(self._tables(rigid, amplitude), self.file, **options)
 
     def _tables(self, rigid: dict[str, Any], amplitude: float | None) -> dict[str, Any]:
-        """Return the file's tables with the structure and the level that the pipeline gives."""
+        """Return the file's tables with the structure and the level of the pipeline."""
         tables = self._kept(read_toml(self.file))
         if self.table.structure is not None:
             reduced = {"file": str(self.products.get("reduced", REDUCED))}
@@ -324,20 +324,20 @@ class OnScene(Stage):
         return tables
 
     def _kept(self, tables: dict[str, Any]) -> dict[str, Any]:
-        """Return the scene's tables without the keys in whose place the pipeline gives others."""
+        """Return the scene's tables without the keys that the pipeline replaces."""
         structure, excitation = tables.get("structure", {}), tables.get("excitation", {})
         if not (isinstance(structure, dict) and isinstance(excitation, dict)):
             raise InputError("structure, excitation: expected tables, headed [structure] and [excitation]")
         if self.table.structure is not None:
             model, replaced = _MODELS[self.table.structure]
-            own = structure if structure.get("model") == model else {}
-            tables["structure"] = {"model": model} | {key: own[key] for key in own if key not in replaced}
+            base = structure if structure.get("model") == model else {}
+            tables["structure"] = {"model": model} | {key: base[key] for key in base if key not in replaced}
         if self.table.level is not None:
             tables["excitation"] = {key: excitation[key] for key in excitation if key not in _LEVELS}
         return tables
 
     def _model(self) -> tuple[dict[str, Any], float | None]:
-        """Return the rigid model (nothing before it is made) and the amplitude at the fatigue level."""
+        """Return the rigid model (empty before it exists) and the amplitude at the fatigue level."""
         source = self.products.get("rigid")
         if source is None or not source.exists() or (self.table.structure != "rigid" and self.table.level is None):
             return {}, None
@@ -382,22 +382,22 @@ class Report(Stage):
 
 
 def _without_level(inputs: Inputs, strengths: bool = False) -> dict[str, Any]:
-    """Return the inputs of a case's stage without those of the fatigue level, which concerns no mode.
+    """Return the inputs of a case's stage without those of the fatigue level, which does not affect modes.
 
     strengths: keep the strengths and fatigue data of materials.
     """
-    found = copy.deepcopy(dict(inputs))
-    for tables in (data for subject, data in found.items() if subject.startswith("case ")):
+    remaining = copy.deepcopy(dict(inputs))
+    for tables in (data for subject, data in remaining.items() if subject.startswith("case ")):
         tables.pop("calibration", None)
         if not strengths and "material" in tables:
             tables["material"] = without_strengths(tables["material"])
-    return found
+    return remaining
 
 
 def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage]:
-    """Yield the stages of a pipeline file with results in a folder, each after those that it takes from."""
+    """Yield the stages of a pipeline file with results in a folder, each after the stages that it depends on."""
     base, folder = source.resolve().parent, folder.resolve()
-    made: list[Path] = []
+    results: list[Path] = []
     case, tuned = (base / (pipeline.case or "")).resolve(), tuple[Path, ...]()
     products: dict[str, Path] = {}
     if pipeline.calibrate is not None:
@@ -405,28 +405,28 @@ def stages(pipeline: PipelineFile, source: Path, folder: Path) -> Iterator[Stage
         yield Calibrate("calibrate", case, files, ())
         products["rigid"] = files[0]
         case, tuned = files[1], files[1:2]
-        made.append(files[0])
+        results.append(files[0])
     if pipeline.modal is not None:
         yield Modal("modal", case, (folder / MODES,), tuned)
         products.setdefault("rigid", folder / MODES)
-        made.append(folder / MODES)
+        results.append(folder / MODES)
     if pipeline.reduce is not None:
         yield Reduce("reduce", case, (folder / REDUCED,), tuned, pipeline.reduce)
         products["reduced"] = folder / REDUCED
-        made.append(folder / REDUCED)
-    for one in pipeline.identify:
-        files = (folder / f"{one.stem}.h5", folder / one.scene)
-        yield Identify(f"identify {one.stem}", (base / one.study).resolve(), files, (), one)
-        made.append(files[0])
+        results.append(folder / REDUCED)
+    for identified in pipeline.identify:
+        files = (folder / f"{identified.stem}.h5", folder / identified.scene)
+        yield Identify(f"identify {identified.stem}", (base / identified.study).resolve(), files, (), identified)
+        results.append(files[0])
     for kind in JOBS:
         for table in getattr(pipeline, kind):
             stage = _on_scene(kind, table, base, folder, products, pipeline)
             yield stage
-            made += stage.outputs
+            results += stage.outputs
     if pipeline.report is not None:
         further = tuple(base / name for name in pipeline.report.results)
         page = folder / pipeline.report.file
-        yield Report("report", page, (page,), tuple(made), further, pipeline.report.title)
+        yield Report("report", page, (page,), tuple(results), further, pipeline.report.title)
 
 
 def _on_scene(
@@ -452,14 +452,14 @@ def _on_scene(
 
 
 def _digests(files: Iterable[str | Path], folder: Path) -> dict[str, str]:
-    """Return the digests of the files that are there, by their paths from a folder."""
+    """Return the digests of existing files, by their paths relative to a folder."""
     return {f"file {os.path.relpath(file, folder)}": digest(file) for file in files if Path(file).is_file()}
 
 
 def _software(*packages: str) -> dict[str, Any]:
     """Return the versions of the software that the numbers of a stage depend on."""
-    found = versions()
+    installed = versions()
     for package in packages:
         with suppress(importlib.metadata.PackageNotFoundError):
-            found[package] = importlib.metadata.version(package)
-    return {"version": found}
+            installed[package] = importlib.metadata.version(package)
+    return {"version": installed}

@@ -180,8 +180,8 @@ class PipelineFile:
             raise ValueError("case: no stage takes it; give [calibrate], [modal] or [reduce], or leave it out")
         if not (structural or self.identify or self.jobs):
             raise ValueError("sweep: missing; give a stage: [calibrate], [modal], [reduce], [[identify]] or [[sweep]]")
-        for key, one in self.identified.items():
-            self._check_name(key, one)
+        for key, stage in self.identified.items():
+            self._check_name(key, stage)
         for key, table in self.jobs.items():
             self._check_job(key, table)
             self._check_name(key, table)
@@ -208,18 +208,18 @@ class PipelineFile:
     def _check_name(self, key: str, table: JobStage | IdentifyStage) -> None:
         if not table.stem or Path(table.stem).name != table.stem:
             raise ValueError(f"{key}.name: expected a file name without folder and suffix, not '{table.stem}'")
-        stems = [one.stem for one in self.jobs.values()] + [one.stem for one in self.identify]
+        stems = [stage.stem for stage in self.jobs.values()] + [stage.stem for stage in self.identify]
         if stems.count(table.stem) > 1:
             raise ValueError(f"{key}.name: two stages have the name '{table.stem}'; give one of them another")
 
     @classmethod
     def load(cls, path: str | Path) -> PipelineFile:
         """Read the file. Raises InputError."""
-        found = validate(cls, read_toml(path), str(path))
-        for key, name in found.named_files.items():
-            if not (Path(path).parent / name).is_file() and not found.makes(name):
+        pipeline = validate(cls, read_toml(path), str(path))
+        for key, name in pipeline.named_files.items():
+            if not (Path(path).parent / name).is_file() and not pipeline.makes(name):
                 raise InputError(f"{path}: {key}: no such file {Path(path).parent / name}")
-        return found
+        return pipeline
 
     @property
     def named_files(self) -> dict[str, str]:

@@ -16,7 +16,7 @@ from vanedamp.files.store import csv_text
 COLOURS = ("#1d4f91", "#c2410c", "#15803d", "#7e22ce", "#0e7490", "#a16207", "#be185d", "#475569")
 DASHES = ("solid", "dash", "dot", "dashdot")  # of bodies
 FONT = "system-ui, -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif"
-#: how plotly shows a chart, with no button that would send data anywhere
+#: plotly's options, without the button that sends data to a server
 GRAPH: Any = {
     "displaylogo": False, "responsive": True, "modeBarButtons": [["toImage", "zoom2d", "pan2d", "resetScale2d"]]
 }  # fmt: skip
@@ -50,7 +50,7 @@ class Chart:
 def chart(
     name: str, figure: go.Figure, header: Sequence[str], rows: Iterable[Iterable[Any]], sources: Iterable[str]
 ) -> Chart:
-    """Return a figure and its table, numbers in full."""
+    """Return a figure and its table, with all digits."""
     in_space = any(trace.type == "mesh3d" for trace in figure.data)
     buttons = {"modeBarButtons": [["toImage", "orbitRotation", "pan3d", "zoom3d", "resetCameraDefault3d"]]}
     configuration = GRAPH | buttons if in_space else GRAPH
@@ -74,6 +74,6 @@ def axis_title(path: str, units: str, hertz: float = math.nan) -> str:
     if path == "excitation.frequency":
         return "excitation frequency, Hz"
     if path in SPEEDS:
-        known = f" (along the engine order {hertz:.5g} Hz a {units})" if math.isfinite(hertz) else ""
-        return f"speed of rotation, {units}{known}"
+        along_order = f" (along the engine order {hertz:.5g} Hz a {units})" if math.isfinite(hertz) else ""
+        return f"speed of rotation, {units}{along_order}"
     return f"{path}, {units}".removesuffix(", 1")

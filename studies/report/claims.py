@@ -1,4 +1,4 @@
-"""The claims of a study: a file of its own next to the results that they rest on."""
+"""The claims of a study, in a file next to the results that support them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Study:
+class ClaimStudy:
     """A study of several results; sources: names of their files, in its own folder; not_ok: which points are not ok."""
 
     study: str

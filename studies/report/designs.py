@@ -1,7 +1,7 @@
-"""Designs of sweeps, each judged by its worst curve.
+"""Designs of sweeps, each rated by its worst curve.
 
-The designer chooses gap and mass, but neither how a run begins nor what friction turns out to be
-(coupling.sweep.designs.is_choice). So curves that differ in nothing else are one design, as good as the worst of
+The designer chooses gap and mass, but neither the start of a run nor the friction
+(coupling.sweep.designs.is_choice). Curves that differ only in these are one design, rated by the worst of
 them.
 """
 
@@ -19,7 +19,7 @@ from vanedamp.studies.report.forced_response import ForcedResponse
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class DesignCurves:
     """The curves of a design, the one with the highest damped peak first."""
 
     curves: tuple[ForcedResponse, ...]
@@ -42,20 +42,20 @@ class Design:
 
     @property
     def remarks(self) -> list[str]:
-        """Which of its curves the results are of, and that there is one start only."""
+        """Remarks on the curve that the results refer to, and on a single start."""
         remarks = []
         if len(self.curves) > 1:
             paths = dict.fromkeys(path for curve in self.curves for path in curve.settings if not is_choice(path))
             over = f" ({', '.join(paths)})" if paths else ""
             remarks.append(f"this is the worst of {len(self.curves)} curves of the design{over}")
-        ratio, own = (f"{curve.headline.maximum_ratio:.3f}" for curve in (self.largest, self.worst))
-        if ratio != own:
+        ratio, worst = (f"{curve.headline.maximum_ratio:.3f}" for curve in (self.largest, self.worst))
+        if ratio != worst:
             remarks.append(f"the largest amplitude is {ratio}, of {self.largest.name}")
         return remarks if self.starts > 1 else [*remarks, "one start only"]
 
     @property
     def sentence(self) -> str:
-        """The result for people, of the worst curve."""
+        """The result of the worst curve in words."""
         return "; ".join([self.worst.sentence, *self.remarks])
 
     def to_json(self) -> dict[str, Any]:
@@ -64,20 +64,20 @@ class Design:
         return self.worst.to_json() | of | {"sentence": self.sentence}
 
 
-def designs(responses: Iterable[ForcedResponse]) -> list[Design]:
-    """Return the designs of some curves, the best first: the one whose worst curve has the lowest damped peak.
+def designs(responses: Iterable[ForcedResponse]) -> list[DesignCurves]:
+    """Return the designs of curves, best first: the best has the lowest damped peak of its worst curve.
 
-    Peaks are relative to those without bodies. Designs are at the end if a point that is not ok may be their peak.
+    Peaks are relative to peaks without bodies. Designs whose peak may be at a failed point come last.
     """
     curves = list(responses)
     heights = np.array([curve.headline.peak_ratio for curve in curves])
-    known = np.array([curve.peak_known for curve in curves])
-    judged = ranked([curve.design for curve in curves], heights, known, known)
-    return [Design(tuple(curves[place] for place in places)) for places in judged]
+    certain = np.array([curve.peak_known for curve in curves])
+    judged = ranked([curve.design for curve in curves], heights, certain, certain)
+    return [DesignCurves(tuple(curves[index] for index in indices)) for indices in judged]
 
 
 def best_first(responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:
-    """Return curves by their designs, the best first, and of each design the worst first."""
+    """Return curves sorted by designs, best first, and within each design worst first."""
     return [curve for design in designs(responses) for curve in design.curves]
 
 

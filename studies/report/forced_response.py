@@ -55,8 +55,8 @@ class ForcedResponse(Measured):
     hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
     settings           values of the sweep's other axes by path
     source             the file it comes from
-    peak_known         whether no point that is not ok may be the peak
-    design, start      what stands for the numbers of its scene that the designer chooses, and for how its runs begin
+    peak_known         whether the peak is certain: no failed point can be higher
+    design, start      identifiers of the parameters that the designer chooses, and of the start of its runs
     """
 
     name: str
@@ -86,7 +86,7 @@ class ForcedResponse(Measured):
 
     @property
     def sentence(self) -> str:
-        """The headline for people."""
+        """The headline in words."""
         sentence = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1], math.isfinite(self.hertz))
         return f"{self.name}: {sentence}"
 
@@ -114,31 +114,31 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
     paths = list(sweep.axes)
     along = paths.index(sweep.along)
     order = np.argsort(sweep.axes[paths[along]], kind="stable")
-    others = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
+    other_values = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
     labels = [path for index, path in enumerate(paths) if index != along]
     leaves = [(path, value) for path, value in _leaves(sweep.scene.to_dict()) if path not in paths]
     base = [frozenset(leaf for leaf in leaves if of(leaf[0])) for of in (is_choice, is_start)]
     responses = []
-    for combination in itertools.product(*(range(len(values)) for values in others)):
+    for combination in itertools.product(*(range(len(values)) for values in other_values)):
         point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
         units = sweep.units()
-        settings = {path: axis[index] for path, axis, index in zip(labels, others, combination, strict=True)}
+        settings = {path: axis[index] for path, axis, index in zip(labels, other_values, combination, strict=True)}
         values = [setting(path, value, units[path]) for path, value in settings.items()]
         title = ", ".join([name or model_name(sweep.scene), *values])
         design, start = (
-            (same, *((path, value) for path, value in settings.items() if of(path)))
-            for same, of in zip(base, (is_choice, is_start), strict=True)
+            (shared, *((path, value) for path, value in settings.items() if of(path)))
+            for shared, of in zip(base, (is_choice, is_start), strict=True)
         )
-        found = response_along(sweep, point, paths[along], title, settings)
-        responses.append(replace(found, design=design, start=start))
+        response = response_along(sweep, point, paths[along], title, settings)
+        responses.append(replace(response, design=design, start=start))
     return responses
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Hashable]]:
     """Yield the values of nested tables and lists by their dotted paths."""
     if isinstance(value, Mapping | list | tuple):
-        for key, each in value.items() if isinstance(value, Mapping) else enumerate(value):
-            yield from _leaves(each, f"{path}.{key}" if path else str(key))
+        for key, item in value.items() if isinstance(value, Mapping) else enumerate(value):
+            yield from _leaves(item, f"{path}.{key}" if path else str(key))
     else:
         yield path, value
 
@@ -166,10 +166,10 @@ def response_along(
         name: frozen(np.where(ok.reshape(-1, *(1 for _ in values.shape[len(sweep.shape) :])), values[point], np.nan))
         for name, values in numbers.items()
     }
-    impacts, known = quantities[impacts_per_period.name], quantities.get(wall_impacts.name)
-    counted = known is not None and not np.isnan(known[ok]).any()
-    alone = not sweep.in_plane and len({damper.cavity for damper in sweep.scene.damper}) == len(sweep.scene.damper)
-    walls = known.sum(axis=1) if counted and known is not None else impacts
+    impacts, on_walls = quantities[impacts_per_period.name], quantities.get(wall_impacts.name)
+    counted = on_walls is not None and not np.isnan(on_walls[ok]).any()
+    single = not sweep.in_plane and len({damper.cavity for damper in sweep.scene.damper}) == len(sweep.scene.damper)
+    walls = on_walls.sum(axis=1) if counted and on_walls is not None else impacts
     return ForcedResponse(
         name=name,
         axis=axis,
@@ -184,7 +184,7 @@ def response_along(
             fixed, tops, axis == swept,
         ),
         hertz=hertz if axis == swept else math.nan,
-        onset_of="impacts on walls" if counted or alone else "impacts of any kind",
+        onset_of="impacts on walls" if counted or single else "impacts of any kind",
         settings=settings,
         peak_known=bool(ok.any() and amplitude_known(sweep)[point].all() and not (mean[~ok] > mean[ok].max()).any()),
         **cut,
@@ -192,35 +192,35 @@ def response_along(
 
 
 def linear_curves(sweep: Sweep, response: ForcedResponse) -> LinearCurves:
-    """Return the linear curves of a response so fine that they hide no peak; at its points only where that cannot be.
+    """Return linear curves of a response, fine enough to resolve all peaks; otherwise at its points only.
 
-    They are computed from the sweep's scene, and taken if they agree with the sweep's at its points: a reduced
-    model may lie elsewhere by now, or be another one.
+    They are computed from the sweep's scene, and used if they agree with the sweep at its points: a reduced
+    model may have been moved or replaced since.
     """
-    kept = response.linear
-    if not math.isfinite(response.hertz) or not np.isfinite(kept.undamped).all():
-        return kept
+    stored = response.linear
+    if not math.isfinite(response.hertz) or not np.isfinite(stored.undamped).all():
+        return stored
     low, high = response.hertz * float(response.x[0]), response.hertz * float(response.x[-1])
     try:
         scene = base_scene(sweep.scene).replace({**response.settings, response.axis: response.x[0]})
         curves = linear_between(scene, low, high, response.hertz * response.x)
     except (VanedampError, OSError):
-        return kept
+        return stored
     at = np.searchsorted(curves.x, response.hertz * response.x)
-    if not np.allclose([curves.undamped[at], curves.fixed[at]], [kept.undamped, kept.fixed], rtol=_SAME, atol=0.0):
-        return kept
+    if not np.allclose([curves.undamped[at], curves.fixed[at]], [stored.undamped, stored.fixed], rtol=_SAME, atol=0.0):
+        return stored
     return curves._replace(x=frozen(curves.x / response.hertz))
 
 
 def linear_between(scene: Scene, low: float, high: float, further: np.ndarray = _NOWHERE) -> LinearCurves:
-    """Return the linear curves from a frequency to another, Hz, so fine that they hide no peak, and at further ones.
+    """Return linear curves between two frequencies, Hz, fine enough to resolve all peaks, and at further frequencies.
 
-    Along an engine order that is not sure. Raises InputError as coupling.system.linear_response.linear_responses.
+    Along an engine order, peaks may be missed. Raises InputError as coupling.system.linear_response.linear_responses.
     """
     if scene.excitation.engine_order is None:
         both = linear_responses(scene)
-        frequencies = np.unique(np.concatenate([further, *(each.grid(low, high) for each in both)]))
-        amplitudes = [each.amplitude(frequencies) for each in both]
+        frequencies = np.unique(np.concatenate([further, *(response.grid(low, high) for response in both)]))
+        amplitudes = [response.amplitude(frequencies) for response in both]
     else:
         frequencies = np.unique(np.concatenate([further, np.linspace(low, high, _ALONG_ORDER)]))
         amplitudes = list(linear_amplitudes(scene, frequencies))

@@ -39,12 +39,12 @@ def responses_figure(
     """Draw linear and damped (maximum and mean) amplitudes, relative to the maximum without bodies.
 
     linear: the linear curves of each, by default those at its points. shown: names of the responses that are drawn at
-    first; the others wait for `curves.js`, and the table next to the chart is its legend. Default: all, with a legend.
+    first; `curves.js` adds the others, with the table next to the chart as legend. Default: all, with a legend.
     """
     figure = go.Figure()
     colours = cycle(len(responses))
     for curve in ("undamped", "fixed"):
-        for owners, response, curves in _distinct(responses, linear or [each.linear for each in responses], curve):
+        for owners, response, curves in _distinct(responses, linear or [entry.linear for entry in responses], curve):
             colour = _SHARED if len(owners) > 1 else colours[responses.index(response)]
             group = "without loose bodies" if len(owners) > 1 else response.name
             _add_amplitude(
@@ -74,8 +74,8 @@ def _add_amplitude(
 def jumps(mean: np.ndarray, confidence: np.ndarray, reference: float) -> np.ndarray:
     """Return the places (k,) of the points before which a curve of means (n,) jumps: another motion begins there.
 
-    A jump is larger than the confidence of its ends, than a small fraction of the reference, and than what the curve
-    changes by around it.
+    A jump exceeds the confidence of its ends, a small fraction of the reference, and the changes of the
+    curve around it.
     """
     if len(mean) < 2:
         return np.zeros(0, int)
@@ -95,14 +95,14 @@ def _parted(drawn: Mapping[str, Any], gaps: np.ndarray) -> dict[str, Any]:
 def _add_band(
     figure: go.Figure, shown: Collection[str] | None, response: ForcedResponse, colour: str, gaps: np.ndarray
 ) -> None:
-    """Draw the 95 % confidence of the means as a band, in a piece between two jumps each."""
+    """Draw the 95 % confidence of the means as a band, in pieces between jumps."""
     sure = _known(np.isfinite(response.confidence) & np.isfinite(response.damped_mean))
-    for kept in (part for piece in sure for part in np.split(piece, np.searchsorted(piece, gaps))):
-        if not (response.confidence[kept] > 0.0).any():
+    for points in (segment for piece in sure for segment in np.split(piece, np.searchsorted(piece, gaps))):
+        if not (response.confidence[points] > 0.0).any():
             continue
-        mean, half = response.damped_mean[kept] / response.reference, response.confidence[kept] / response.reference
+        mean, half = response.damped_mean[points] / response.reference, response.confidence[points] / response.reference
         _add(
-            figure, [response.name], shown, x=np.concatenate([response.x[kept], response.x[kept][::-1]]),
+            figure, [response.name], shown, x=np.concatenate([response.x[points], response.x[points][::-1]]),
             y=np.concatenate([mean + half, (mean - half)[::-1]]), fill="toself", fillcolor=colour, opacity=0.25,
             mode="lines", line={"width": 0, "color": colour}, name="95 % confidence of the mean", hoverinfo="skip",
             legendgroup=response.name, showlegend=False,
@@ -113,19 +113,19 @@ def _distinct(
     responses: Sequence[ForcedResponse], linear: Sequence[LinearCurves], curve: str
 ) -> list[tuple[list[str], ForcedResponse, LinearCurves]]:
     """Return the linear curves that differ: names of responses with a common curve, their first, and the curve."""
-    found: list[tuple[list[str], ForcedResponse, LinearCurves]] = []
+    groups: list[tuple[list[str], ForcedResponse, LinearCurves]] = []
     for response, curves in zip(responses, linear, strict=True):
-        for owners, first, other in found:
+        for owners, first, first_curves in groups:
             # sweeps of gaps, friction ... have common linear curves
             if response.reference == first.reference and all(
                 np.array_equal(one, two)
-                for one, two in ((curves.x, other.x), (getattr(curves, curve), getattr(other, curve)))
+                for one, two in ((curves.x, first_curves.x), (getattr(curves, curve), getattr(first_curves, curve)))
             ):
                 owners.append(response.name)
                 break
         else:
-            found.append(([response.name], response, curves))
-    return found
+            groups.append(([response.name], response, curves))
+    return groups
 
 
 def _add(
@@ -163,10 +163,10 @@ def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str]
 
 
 def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
-    """Draw where the energy goes: stacked fractions of the losses, one panel per response, each with a point."""
+    """Draw the energy losses: stacked fractions, one panel per response with a point."""
     columns = min(len(responses), _PANELS)
     rows = -(-len(responses) // columns)
-    # a name is as wide as a panel at most: its settings stand below each other
+    # names are wrapped to the width of a panel
     titles = ["<br>".join(_wrapped(response.name, _TITLE_WIDTH // columns)) for response in responses]
     lines = max(title.count("<br>") for title in titles) + 1
     above, below = 20 + 16 * lines, 60
@@ -176,12 +176,12 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
         vertical_spacing=(above + below) / (height - above - below) if rows > 1 else 0.0,
     )  # fmt: skip
     for number, response in enumerate(responses):
-        pieces = _known(np.isfinite(response.energy_share).all(axis=1))  # in a stack, plotly takes what is not for zero
-        for (piece, part), (index, loss) in itertools.product(enumerate(pieces), enumerate(LOSSES)):
-            if not any((other.energy_share[:, index] > 0).any() for other in responses):
+        pieces = _known(np.isfinite(response.energy_share).all(axis=1))  # plotly treats gaps in a stack as zero
+        for (piece, points), (index, loss) in itertools.product(enumerate(pieces), enumerate(LOSSES)):
+            if not any((response.energy_share[:, index] > 0).any() for response in responses):
                 continue
             figure.add_scatter(
-                x=response.x[part], y=100 * response.energy_share[part, index], name=loss, mode="lines",
+                x=response.x[points], y=100 * response.energy_share[points, index], name=loss, mode="lines",
                 stackgroup=f"{number}-{piece}", line={"width": 0.5, "color": _LOSS_COLOURS[loss]}, legendgroup=loss,
                 showlegend=number == piece == 0, hovertemplate=f"{loss}: %{{y:.1f}} %<extra></extra>",
                 row=number // columns + 1, col=number % columns + 1,
@@ -197,23 +197,23 @@ def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:
     return figure.update_xaxes(title_font_size=11) if columns == _PANELS else figure
 
 
-def _known(known: np.ndarray) -> list[np.ndarray]:
-    """Return the places of the points (n,) that are known, in pieces without others between them."""
-    places = np.flatnonzero(known)
-    return [piece for piece in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if piece.size]
+def _known(mask: np.ndarray) -> list[np.ndarray]:
+    """Return the indices of the known points (n,) in contiguous pieces."""
+    indices = np.flatnonzero(mask)
+    return [piece for piece in np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1) if piece.size]
 
 
 def _wrapped(name: str, width: int) -> list[str]:
     """Return a name in lines of a width, broken after commas."""
     lines = [""]
-    for part in name.split(", "):
-        longer = f"{lines[-1]}, {part}" if lines[-1] else part
-        lines = [*lines[:-1], longer] if len(longer) <= width or not lines[-1] else [*lines, part]
+    for setting in name.split(", "):
+        longer = f"{lines[-1]}, {setting}" if lines[-1] else setting
+        lines = [*lines[:-1], longer] if len(longer) <= width or not lines[-1] else [*lines, setting]
     return lines
 
 
 def plane_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
-    """Draw largest tilt, fraction of the time off the floor and what small tilts neglect, of each body in the plane.
+    """Draw largest tilt, airborne fraction of the time and error by assuming small tilts, of each planar body.
 
     shown: as of `responses_figure`.
     """
@@ -251,7 +251,7 @@ def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int)
     hertz = orders.pop() if len(orders) == 1 else math.nan
     figure.update_xaxes(hoverformat=".6g")
     for axis in figure.select_xaxes():
-        if axis.showticklabels is not False:  # of panels above each other, the lowest carries the title
+        if axis.showticklabels is not False:  # only the lowest panel has the title
             axis.update(title_text=axis_title(responses[0].axis, responses[0].units, hertz))
     figure.update_layout(hovermode="x unified")
     return dressed(figure, height)

@@ -22,7 +22,7 @@ from vanedamp.studies.report.forced_response import for_people, setting
 _FEWEST = 4  # values of the second axis that make a map
 #: panels that are drawn
 MOST_PANELS = 24
-#: panels in two columns, of more there are three; heights of a panel and of the space between two, px
+#: largest number of panels in two columns, otherwise three; heights of a panel and of the space between panels, px
 _IN_TWO, _TALL, _LOW, _BETWEEN = 6, 440, 320, 120
 #: colours that the colour-blind tell apart (Okabe and Ito 2008)
 _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")
@@ -31,9 +31,9 @@ _NOT_OK, _NO_STATE = "#9ca3af", "not ok"
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
-    """Return the two axes of a sweep's map: the frequency, or else the longest, and the longest other; None without.
+    """Return the two axes of a sweep's map: the frequency, or the longest axis, and the next longest; None without.
 
-    How runs begin is no axis of a map.
+    Starts of runs are no axes of a map.
     """
     numeric = [path for path in long_axes(sweep) if not is_start(path)]
     numeric.sort(key=lambda path: (path != FREQUENCY, -len(sweep.axes[path])))
@@ -41,7 +41,7 @@ def map_axes(sweep: Sweep) -> tuple[str, str] | None:
 
 
 def long_axes(sweep: Sweep) -> list[str]:
-    """Return the axes with numbers enough for a map."""
+    """Return the numeric axes with enough values for a map."""
     return [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) >= _FEWEST]
 
 
@@ -104,23 +104,23 @@ def panels(
     paths, units = list(axes), sweep.units()
     across, up = (paths.index(path) for path in two)
     order = [np.argsort(axes[path], kind="stable") for path in two]
-    others = [index for index in range(len(paths)) if index not in (across, up)]
-    found = []
-    for combination in itertools.product(*(range(values.shape[index]) for index in others)):
+    other_axes = [index for index in range(len(paths)) if index not in (across, up)]
+    results = []
+    for combination in itertools.product(*(range(values.shape[index]) for index in other_axes)):
         point: list[int | slice] = [slice(None)] * len(paths)
-        for index, value in zip(others, combination, strict=True):
+        for index, value in zip(other_axes, combination, strict=True):
             point[index] = value
         cut = values[tuple(point)]
         cut = (cut if up < across else cut.T)[np.ix_(order[1], order[0])]
         name = ", ".join(
-            setting(paths[i], axes[paths[i]][j], units[paths[i]]) for i, j in zip(others, combination, strict=True)
+            setting(paths[i], axes[paths[i]][j], units[paths[i]]) for i, j in zip(other_axes, combination, strict=True)
         )
-        found.append((name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut))
-    return found
+        results.append((name, axes[two[0]][order[0]], axes[two[1]][order[1]], cut))
+    return results
 
 
 def basin_axes(sweep: Sweep) -> tuple[str, str] | None:
-    """Return the two starts over which a sweep shows basins, a place across and a rate up; None without two."""
+    """Return the two starts of a sweep's basins, position horizontally and velocity vertically; None without two."""
     starts = sorted(filter(is_start, long_axes(sweep)), key=lambda path: -len(sweep.axes[path]))[:2]
     starts.sort(key=lambda path: path.endswith(("velocity", "rate")))
     return (starts[0], starts[1]) if len(starts) == 2 else None
@@ -132,13 +132,13 @@ def has_responses(sweep: Sweep) -> bool:
 
 
 def count_axes(sweep: Sweep) -> tuple[str, str] | None:
-    """Return the two keys over which a sweep counts steady states; None without, or where all runs begin alike."""
+    """Return the two parameters of a sweep's map of steady states; None without, or if all runs have the same start."""
     several = any(is_start(path) and len(values) > 1 for path, values in sweep.axes.items())
     return map_axes(sweep) if several else None
 
 
 def basins_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
-    """Draw in which motion the run from each start ends, by colour; one panel per combination of other axes."""
+    """Draw the final motion of the run from each start, by colour; one panel per combination of other axes."""
     motions = _motions(states)
     shades = [_NOT_OK, *(_COLOURS[number % len(_COLOURS)] for number in range(len(motions) - 1))]
     named = basin_panels(sweep, states)
@@ -163,24 +163,24 @@ def basin_panels(sweep: Sweep, states: SteadyStates) -> list[Panel]:
     names = np.full(sweep.shape, _NO_STATE, object)
     order = [list(sweep.axes).index(path) for path in (*states.parameters, *states.starts)]
     label, named = np.transpose(states.label, order), np.transpose(names, order)
-    for place, found in np.ndenumerate(states.states):
-        for number, name in enumerate(_names(found)):
-            named[place][label[place] == number] = name
+    for index, at_point in np.ndenumerate(states.states):
+        for number, name in enumerate(_names(at_point)):
+            named[index][label[index] == number] = name
     return panels(sweep, sweep.axes, names, basin_axes(sweep))
 
 
 def _names(states: Sequence[SteadyState]) -> list[str]:
-    """Return the motions of states; a second one of a kind, of larger amplitude, has its number."""
+    """Return the names of states' motions; further ones of a kind, with larger amplitude, are numbered."""
     motions = [state.motion for state in states]
-    earlier = [motions[:place].count(motion) for place, motion in enumerate(motions)]
+    earlier = [motions[:number].count(motion) for number, motion in enumerate(motions)]
     return [f"{motion} ({count + 1})" if count else motion for motion, count in zip(motions, earlier, strict=True)]
 
 
 def _motions(states: SteadyStates) -> list[str]:
-    """Return the name of runs that are not ok, then of all motions, by falling number of runs."""
+    """Return the name of failed runs, then the names of all motions by descending number of runs."""
     runs: Counter[str] = Counter()
-    for found in states.states.flat:
-        runs.update(dict(zip(_names(found), (state.runs for state in found), strict=True)))
+    for at_point in states.states.flat:
+        runs.update(dict(zip(_names(at_point), (state.runs for state in at_point), strict=True)))
     return [_NO_STATE, *(name for name, _ in runs.most_common())]
 
 
@@ -200,12 +200,12 @@ def count_figure(sweep: Sweep, states: SteadyStates) -> go.Figure:
 def state_rows(sweep: Sweep, states: SteadyStates) -> Iterator[list[object]]:
     """Yield values of the parameters, number of the state from 1, and the state's results."""
     axes = [sweep.axes[path].tolist() for path in states.parameters]
-    for place, found in np.ndenumerate(states.states):
-        at = [values[index] for values, index in zip(axes, place, strict=True)]
-        yield from ([*at, number, *state] for number, state in enumerate(found, start=1))
+    for point, at_point in np.ndenumerate(states.states):
+        at = [values[index] for values, index in zip(axes, point, strict=True)]
+        yield from ([*at, number, *state] for number, state in enumerate(at_point, start=1))
 
 
 def _steps(shades: Sequence[str]) -> list[list[object]]:
-    """Return a colour scale of steps as wide as each other."""
+    """Return a colour scale of equal steps."""
     edges = np.repeat(np.linspace(0.0, 1.0, len(shades) + 1), 2)[1:-1]
     return [[edge, shade] for edge, shade in zip(edges.tolist(), np.repeat(shades, 2).tolist(), strict=True)]

@@ -1,4 +1,4 @@
-"""Mode shapes that can be turned: the surface of the mesh, deformed and coloured by displacement (plotly)."""
+"""Interactive mode shapes: the surface of the mesh, deformed and coloured by displacement (plotly)."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from scipy.spatial import cKDTree
 
 from vanedamp.studies.report.charts import FONT
 
-#: surfaces with more triangles than this are shown as pictures: turning them would be no pleasure
+#: surfaces with more triangles are shown as pictures: rotating them would be too slow
 MOST_TRIANGLES = 60_000
 _MOST_MODES = 12
 _DISTANCE = 2.3  # of the eye, in sizes of the scene
 #: views from which the best is taken, degrees; cells of a coarse screen across the structure
 _AZIMUTHS, _ELEVATION, _SCREEN = (25.0, 70.0, 115.0, 160.0, 205.0, 250.0, 295.0, 340.0), 18.0, 24
-_NEAR = 0.03  # around hot spots, in sizes of the structure: what is to be seen of them
+_NEAR = 0.03  # radius around hot spots that the view shows, in sizes of the structure
 _EXAGGERATION = 0.06  # largest displacement, as a fraction of the structure's size
 # cells by their number of nodes: faces by corners, as VTK counts them
 _TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
@@ -58,7 +58,7 @@ def unit_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def screen_of(view: np.ndarray) -> np.ndarray:
-    """Return the directions (3, 2) to the right and up of a screen across a view (3,), of unit length."""
+    """Return the unit vectors (3, 2) to the right and up on a screen normal to a view direction (3,)."""
     right = np.array([-view[1], view[0], 0.0]) / np.hypot(view[0], view[1])
     return np.column_stack([right, np.cross(view, right)])
 
@@ -69,38 +69,38 @@ def deformed(points: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndar
     return points + shape * (_EXAGGERATION * size / magnitude.max()), magnitude / magnitude.max()
 
 
-class Surface(NamedTuple):
-    """The nodes (n,) on a mesh's surface, and its triangles (t, 3) as places in them."""
+class MeshSurface(NamedTuple):
+    """The nodes (n,) on a mesh's surface, and its triangles (t, 3) as indices of these nodes."""
 
     nodes: np.ndarray
     triangles: np.ndarray
 
 
-def small_surface(values: Mapping[str, np.ndarray], most: float = MOST_TRIANGLES) -> Surface | None:
-    """Return the surface of a record of modes, if a page can carry it: so many triangles at most."""
+def small_surface(values: Mapping[str, np.ndarray], most: float = MOST_TRIANGLES) -> MeshSurface | None:
+    """Return the surface of a record of modes; None if it has more than `most` triangles."""
     cells = values["cell"]
     if cells.shape[1] not in _FACES:
         return None
     nodes, triangles = np.unique(surface(cells), return_inverse=True)
-    return Surface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * most else None
+    return MeshSurface(nodes, triangles.reshape(-1, 3)) if triangles.size <= 3 * most else None
 
 
 def viewpoint(points: np.ndarray, shape: np.ndarray, elevations: Sequence[float] = (_ELEVATION,)) -> np.ndarray:
-    """Return the direction (3,), of unit length, from which a mode's shape (n, 3) at points (n, 3) is best seen.
+    """Return the unit vector (3,) of the best viewpoint for a mode's shape (n, 3) at points (n, 3).
 
-    Of directions around z, at elevations above the horizon in degrees, that from which most of the motion is in sight,
-    and across the view: nothing that stands still hides it.
+    Of directions around z at elevations above the horizon, in degrees, it shows most of the motion,
+    in the screen plane and not hidden by parts at rest.
     """
     above, angles = (grid.ravel() for grid in np.meshgrid(np.radians(elevations), np.radians(_AZIMUTHS), indexing="ij"))
     views = np.column_stack([np.cos(above) * np.cos(angles), np.cos(above) * np.sin(angles), np.sin(above)])
     scores = [_in_sight(points, shape, view) for view in views]
-    # of views as good as each other, the first, whatever the last bit says
+    # of equally good views the first, independent of the last bit
     best = int(np.flatnonzero(np.array(scores) >= 0.99 * max(scores))[0])
     return np.asarray(views[best])
 
 
 def _in_sight(points: np.ndarray, shape: np.ndarray, view: np.ndarray) -> float:
-    """Return how much motion across a view is to be seen: squares over the nearest points of a coarse screen."""
+    """Return the visible motion in the screen plane: sum of squares over the nearest points of a coarse screen."""
     across = screen_of(view)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     cell = np.floor(points @ across * (_SCREEN / size)).astype(int)
@@ -109,7 +109,7 @@ def _in_sight(points: np.ndarray, shape: np.ndarray, view: np.ndarray) -> float:
     return float(np.sum((shape[nearest] @ across) ** 2))
 
 
-def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.Figure:
+def mode_figure(values: Mapping[str, np.ndarray], of: MeshSurface, mode: int) -> go.Figure:
     """Draw the modes of a record of `vanedamp modal`, one at a time, beginning with `mode`; in mm.
 
     The layout's `meta` has the nodes at rest, from which `modes.js` animates them.
@@ -123,7 +123,7 @@ def mode_figure(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> go.
         figure.add_trace(deformed_mesh(*deformed(points, shape), triangles, visible=index == mode))
     names = [f"mode {index + 1}: {values['frequency'][index]:.2f} Hz" for index in chosen]
     menu = [
-        {"label": name, "method": "update", "args": [{"visible": [True, *(index == other for other in chosen)]}]}
+        {"label": name, "method": "update", "args": [{"visible": [True, *(index == shown for shown in chosen)]}]}
         for index, name in zip(chosen, names, strict=True)
     ]
     in_space(figure, viewpoint(points, shapes[list(chosen).index(mode)]))
@@ -149,7 +149,7 @@ def in_space(figure: go.Figure, view: np.ndarray) -> go.Figure:
 
 
 def spots_figure(
-    values: Mapping[str, np.ndarray], of: Surface, mode: int, spots: Mapping[str, Mapping[str, Any]]
+    values: Mapping[str, np.ndarray], of: MeshSurface, mode: int, spots: Mapping[str, Mapping[str, Any]]
 ) -> go.Figure:
     """Draw the structure at rest, in mm, coloured by the mode's von Mises stress, and hot spots on it.
 
@@ -163,23 +163,23 @@ def spots_figure(
         hovertemplate="%{intensity:.4g} MPa per µm<extra></extra>",
         lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
     ))  # fmt: skip
-    places = 1e3 * np.array([spot["coordinates"] for spot in spots.values()])
+    marks = 1e3 * np.array([spot["coordinates"] for spot in spots.values()])
     figure.add_scatter3d(
-        x=places[:, 0], y=places[:, 1], z=places[:, 2], mode="markers+text", text=list(spots), name="hot spots",
+        x=marks[:, 0], y=marks[:, 1], z=marks[:, 2], mode="markers+text", text=list(spots), name="hot spots",
         marker={"size": 6, "color": "#dc2626", "line": {"color": "#fff", "width": 1}}, textposition="top center",
         hovertemplate="%{text}: %{x:.2f}, %{y:.2f}, %{z:.2f} mm<extra></extra>",
     )  # fmt: skip
-    near = cKDTree(places).query(points)[0] < _NEAR * np.linalg.norm(np.ptp(points, axis=0))
+    near = cKDTree(marks).query(points)[0] < _NEAR * np.linalg.norm(np.ptp(points, axis=0))
     shape = values["shape"][mode].reshape(-1, 3)[of.nodes]
     return in_space(figure, viewpoint(points, np.where(near[:, None], shape, 0.0), (_ELEVATION, -_ELEVATION)))
 
 
-def spots_rows(values: Mapping[str, np.ndarray], of: Surface) -> Iterator[list[float]]:
+def spots_rows(values: Mapping[str, np.ndarray], of: MeshSurface) -> Iterator[list[float]]:
     """Yield x, y, z (m) and von Mises stress per displacement (Pa/m) at the nodes of the surface."""
     yield from np.column_stack([values["coordinates"][of.nodes], values["von_mises"][of.nodes]]).tolist()
 
 
-def mode_rows(values: Mapping[str, np.ndarray], of: Surface, mode: int) -> Iterator[list[float]]:
+def mode_rows(values: Mapping[str, np.ndarray], of: MeshSurface, mode: int) -> Iterator[list[float]]:
     """Yield x, y, z (m) and the displacements of a mode at the nodes of the surface."""
     moved = values["shape"][mode].reshape(-1, 3)
     yield from np.column_stack([values["coordinates"][of.nodes], moved[of.nodes]]).tolist()

@@ -1,6 +1,6 @@
-"""Motion of bodies in their cavities as it is drawn: outlines, walls and contacts, frame by frame.
+"""Motion of bodies in their cavities for drawing: outlines, walls and contacts, frame by frame.
 
-Plays are micrometres where bodies are millimetres: displacements, tilts and free travels are drawn `factor` times as
+Clearances are micrometres and bodies millimetres: displacements, tilts and free travels are drawn `factor` times as
 large. A corner moves by (x - theta b, y + theta a), as in the equations of motion, so that it is drawn on a surface if
 and only if its gap is zero.
 """
@@ -38,7 +38,7 @@ _SIDES = dict(zip(SIDES, OUTWARDS, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
-class BodyMotion:
+class BodyFrames:
     """A body as drawn in n frames, in units of the drawing, y upwards.
 
     form: as which it ran
@@ -63,7 +63,7 @@ class BodyMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class ContactMotion:
+class ContactFrames:
     """A contact as drawn: body, side and corner as of an event, points (n, 2), light (n,) OPEN, CLOSED or HIT."""
 
     place: tuple[int, str, int]
@@ -79,7 +79,7 @@ class CeilingPart(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class CavityMotion:
+class CavityFrames:
     """A cavity as drawn, in the frame of its floor, whose middle is at (0, 0).
 
     left, right: (n, 2) faces of the walls at the height of the floor and at `height`; ceiling: parts above each body,
@@ -92,12 +92,12 @@ class CavityMotion:
     ceiling: list[CeilingPart]
     shift: np.ndarray
     height: float
-    bodies: list[BodyMotion]
-    contacts: list[ContactMotion]
+    bodies: list[BodyFrames]
+    contacts: list[ContactFrames]
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RunFrames:
     """Frames of the last periods of a run.
 
     time: (n,) periods; each: frames per period; displacement: (n,) m, of the response; factor: by which free travels
@@ -110,7 +110,7 @@ class Motion:
     factor: float
     swing: float
     scale: float
-    cavities: list[CavityMotion]
+    cavities: list[CavityFrames]
     sampled: int
 
     @property
@@ -120,7 +120,7 @@ class Motion:
 
     @property
     def has_sliders(self) -> bool:
-        """Whether there are bodies whose drawn size means nothing."""
+        """Whether there are bodies without a size, whose drawn size is arbitrary."""
         return any(not body.form.extended for cavity in self.cavities for body in cavity.bodies)
 
     @property
@@ -138,21 +138,21 @@ class Motion:
         """Return the data for the player of the page (motion.js), y downwards."""
         data = {
             "time": _short(self.time, 4), "each": self.each, "first": self.first,
-            "displacement": _short(1e6 * self.displacement, 3), "cavities": [_drawn(each) for each in self.cavities],
+            "displacement": _short(1e6 * self.displacement, 3), "cavities": [_drawn(item) for item in self.cavities],
         }  # fmt: skip
         return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
     def rows(self) -> Iterator[list[float]]:
         """Yield time (periods) and displacement, then along, lift and tilt of each body."""
         bodies = [body for cavity in self.cavities for body in cavity.bodies]
-        columns = [part for body in bodies for part in (body.along, body.lift, body.tilt)]
+        columns = [column for body in bodies for column in (body.along, body.lift, body.tilt)]
         yield from np.column_stack([self.time, self.displacement, *columns]).tolist()
 
     def header(self) -> list[str]:
         """Return the names of the columns of `rows`."""
         numbers = [body.number + 1 for cavity in self.cavities for body in cavity.bodies]
-        parts = [f"body_{number}_{part}" for number in numbers for part in ("along", "lift", "tilt")]
-        return ["period", "displacement", *parts]
+        names = [f"body_{number}_{quantity}" for number in numbers for quantity in ("along", "lift", "tilt")]
+        return ["period", "displacement", *names]
 
 
 def motion_of(
@@ -162,7 +162,7 @@ def motion_of(
     along: np.ndarray,
     plane: PlanarSamples,
     impacts: list[tuple[float, tuple[int, str, int]]],
-) -> Motion:
+) -> RunFrames:
     """Return the last periods of a run.
 
     time: (t,) s; displacement: (t,) m; along: (t, b) m in the cavity; impacts: time (s) and place as of an event.
@@ -178,19 +178,19 @@ def motion_of(
     swing = min(factor, _rounded(_SWING * max(widths) / max(np.abs(plane.floor_along).max(), 1e-300)))
     draw = _Drawing(scene, plane, along[frames], forms, half, factor, swing, _WIDTH / max(widths))
     light = np.where(plane.contact_closed, CLOSED, OPEN)
-    for moment, place in impacts:
+    for moment, struck_contact in impacts:
         recent = (time >= moment) & (time < moment + _FLASH * period)
-        struck = np.array([other == place for other in plane.contacts])
+        struck = np.array([contact == struck_contact for contact in plane.contacts])
         light[recent[:, None] & struck] = HIT
     cavities = [draw.cavity(cavity, light) for cavity in scene.cavity if scene.bodies_in(cavity)]
-    return Motion(
+    return RunFrames(
         time / period, sampled // stride, displacement[frames], factor, swing, draw.scale, cavities, sampled,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class _Drawing:
-    """Common data of all cavities of a drawing."""
+    """Data for all cavities of a drawing."""
 
     scene: Scene
     plane: PlanarSamples
@@ -201,46 +201,46 @@ class _Drawing:
     swing: float
     scale: float
 
-    def cavity(self, cavity: Cavity, light: np.ndarray) -> CavityMotion:
+    def cavity(self, cavity: Cavity, light: np.ndarray) -> CavityFrames:
         """Draw a cavity and its bodies, which stand from left to right. light: (n, contacts)."""
         inside = self.scene.bodies_in(cavity)
         length = sum(2 * self.half[k][0] for k in inside)
-        bodies, places, ceiling, at = [], [], [], -length / 2
+        bodies, mids, ceiling, at = [], [], [], -length / 2
         for k in inside:
-            places.append(at + self.half[k][0])
-            bodies.append(self._body(k, places[-1]))
+            mids.append(at + self.half[k][0])
+            bodies.append(self._body(k, mids[-1]))
             at += 2 * self.half[k][0]
         highest = max(2 * self.half[k][1] for k in inside)
         if cavity.play is not None:
-            for k, place in zip(inside, places, strict=True):
+            for k, mid in zip(inside, mids, strict=True):
                 a, b = self.half[k]
                 heights = 2 * b + self.factor * (cavity.play + self._ceiling(cavity.play, k))
-                ceiling.append(CeilingPart((self.scale * (place - a), self.scale * (place + a)), self.scale * heights))
+                ceiling.append(CeilingPart((self.scale * (mid - a), self.scale * (mid + a)), self.scale * heights))
             highest += self.factor * cavity.play
         walls = [self._wall(cavity, inside, side, highest) for side in ("left", "right")]
         k = inside[0]
         rotation = self.plane.floor_rotation[:, k]
-        across = np.nan_to_num(self.plane.floor_across[:, k]) - rotation * places[0]
+        across = np.nan_to_num(self.plane.floor_across[:, k]) - rotation * mids[0]
         shift = self.swing * np.column_stack([self.scale * self.plane.floor_along[:, k], self.scale * across, rotation])
         contacts = [
-            ContactMotion(place, self._points(number, bodies), light[:, number])
-            for number, place in enumerate(self.plane.contacts)
-            if place[1] in (*SIDES, "body") and any(body.number == place[0] for body in bodies)
+            ContactFrames(contact, self._points(number, bodies), light[:, number])
+            for number, contact in enumerate(self.plane.contacts)
+            if contact[1] in (*SIDES, "body") and any(body.number == contact[0] for body in bodies)
         ]
         left, right = (
             self.scale * (sign * (length + self.factor * cavity.gap) / 2 + self.factor * wall)
             for sign, wall in zip((-1, 1), walls, strict=True)
         )
-        return CavityMotion(cavity.name, left, right, ceiling, shift, self.scale * highest, bodies, contacts)
+        return CavityFrames(cavity.name, left, right, ceiling, shift, self.scale * highest, bodies, contacts)
 
     def _pose(self, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return along, lift and tilt (n,) of a body's centre in the frame of its floor."""
         return self.along[:, k], np.nan_to_num(self.plane.body_lift[:, k]), np.nan_to_num(self.plane.body_tilt[:, k])
 
-    def _body(self, k: int, place: float) -> BodyMotion:
+    def _body(self, k: int, mid: float) -> BodyFrames:
         along, lift, tilt = self._pose(k)
         a, b = self.half[k]
-        centre = np.column_stack([place + self.factor * along, b + self.factor * lift])
+        centre = np.column_stack([mid + self.factor * along, b + self.factor * lift])
         turn = self.factor * tilt[:, None]
         form, damper = self.forms[k], self.scene.damper[k]
         if form.rolls:
@@ -249,7 +249,7 @@ class _Drawing:
         else:
             outline = centre[:, None, :] + _turned(turn, self._corners(k))
         face = form.face(damper) if form.extended else (b, b)
-        return BodyMotion(
+        return BodyFrames(
             k, form, (self.scale * a, self.scale * b), self.scale * outline,
             (self.scale * face[0], self.scale * face[1]), self.along[:, k], self.plane.body_lift[:, k],
             self.plane.body_tilt[:, k],
@@ -262,9 +262,9 @@ class _Drawing:
         return corners if len(corners) else np.array([(-a, -b), (a, -b), (a, b), (-a, b)])
 
     def _moved(self, k: int, side: str, play: float, *ends: float) -> np.ndarray:
-        """Return by how much a surface has moved towards its outside, relative to the floor: (n, 2) at two ends.
+        """Return the outward displacement of a surface relative to the floor, (n, 2) at two ends.
 
-        That is its gap less the play left by the body's pose, at the contacts, and on the line through two.
+        It is the contact's gap less the clearance from the body's pose, on the line through the contacts.
         ends: from the body's centre, across it for walls, along it for a ceiling.
         """
         along, lift, tilt = self._pose(k)
@@ -273,8 +273,8 @@ class _Drawing:
         for number, (body, at, corner) in enumerate(self.plane.contacts):
             if (body, at) == (k, side):
                 a, b = self._corners(k)[corner].tolist() if corner >= 0 else (0.0, 0.0)
-                place = lift + a * tilt if across else along - b * tilt
-                moved[a if across else b] = self.plane.contact_gap[:, number] - play + sign * place
+                position = lift + a * tilt if across else along - b * tilt
+                moved[a if across else b] = self.plane.contact_gap[:, number] - play + sign * position
         if not moved:
             return np.zeros((len(along), 2))
         low, high = min(moved), max(moved)
@@ -282,29 +282,29 @@ class _Drawing:
         return np.column_stack([moved[low] + slope * (end - low) for end in ends])
 
     def _ceiling(self, play: float, k: int) -> np.ndarray:
-        """Return by how much the ceiling above a body has risen relative to the floor, (n, 2) at the body's ends."""
+        """Return the rise of the ceiling above a body relative to the floor, (n, 2) at the body's ends."""
         a = self.half[k][0]
         return self._moved(k, "ceiling", play, -a, a)
 
     def _wall(self, cavity: Cavity, inside: list[int], side: str, height: float) -> np.ndarray:
-        """Return by how much a wall has moved along relative to the floor, (n, 2) at the floor and at a height."""
+        """Return the displacement of a wall along the floor relative to it, (n, 2) at the floor and at a height."""
         k = inside[0 if side == "left" else -1]
         sign = -1.0 if side == "left" else 1.0
         b = self.half[k][1]
         return sign * self._moved(k, side, cavity.gap / 2, -b, height - b)
 
-    def _points(self, number: int, bodies: list[BodyMotion]) -> np.ndarray:
+    def _points(self, number: int, bodies: list[BodyFrames]) -> np.ndarray:
         """Return the point of a body at which a contact acts (n, 2)."""
         k, side, corner = self.plane.contacts[number]
-        place = next(i for i, body in enumerate(bodies) if body.number == k)
-        body = bodies[place]
+        index = next(i for i, body in enumerate(bodies) if body.number == k)
+        body = bodies[index]
         centre = body.outline[:, 0] if body.round else body.outline.mean(axis=1)
         if corner >= 0:
             return body.outline[:, corner]
         if side != "body":
             return centre + np.array(_SIDES[side]) * body.half
-        heights = common_heights(body.face, bodies[place + 1].face) or (body.half[1],)
-        upper = sum(each == self.plane.contacts[number] for each in self.plane.contacts[:number])
+        heights = common_heights(body.face, bodies[index + 1].face) or (body.half[1],)
+        upper = sum(contact == self.plane.contacts[number] for contact in self.plane.contacts[:number])
         point = np.array([body.half[0], heights[upper] - body.half[1]])
         turn = self.factor * np.nan_to_num(body.tilt)[:, None] * (not body.round)
         return centre + _turned(turn, point[None])[:, 0]
@@ -316,7 +316,7 @@ def _turned(turn: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def _forms(scene: Scene, plane: PlanarSamples) -> list[Shape]:
-    """Return as what each body ran: one without tilt as a slider, an open shape that tilts as a block."""
+    """Return the shape as which each body ran: without tilt a slider, with tilt and an open shape a block."""
     return [
         Slider() if np.isnan(tilt).any() else damper.form if damper.form.extended else Block()
         for damper, tilt in zip(scene.damper, plane.body_tilt.T, strict=True)
@@ -324,15 +324,15 @@ def _forms(scene: Scene, plane: PlanarSamples) -> list[Shape]:
 
 
 def _half_extents(scene: Scene) -> list[tuple[float, float]]:
-    """Return half length and half height of every body; those without any are drawn like the others."""
+    """Return half length and half height of every body; bodies without a size get the mean of the others."""
     extents = [damper.half_extent for damper in scene.damper]
-    known = [extent for extent in extents if extent[0] > 0.0]
-    a, b = np.mean(known, axis=0) if known else np.array([1.5, 1.0]) * max(cavity.gap for cavity in scene.cavity)
+    sized = [extent for extent in extents if extent[0] > 0.0]
+    a, b = np.mean(sized, axis=0) if sized else np.array([1.5, 1.0]) * max(cavity.gap for cavity in scene.cavity)
     return [extent if extent[0] > 0.0 else (float(a), float(b)) for extent in extents]
 
 
 def _factor(scene: Scene, half: list[tuple[float, float]]) -> float:
-    """Return by how much free travels are exaggerated: as much as the drawing bears."""
+    """Return the factor by which free travels are exaggerated, the largest that fits the drawing."""
     bounds = []
     for cavity in scene.cavity:
         inside = scene.bodies_in(cavity)
@@ -348,8 +348,8 @@ def _rounded(value: float) -> float:
     return float(f"{math.floor(value / unit) * unit:.2g}")
 
 
-def _drawn(cavity: CavityMotion) -> dict[str, Any]:
-    """Return a cavity for the player: shapes, and one entry a frame of what moves."""
+def _drawn(cavity: CavityFrames) -> dict[str, Any]:
+    """Return the data of a cavity for the player: shapes, and moving quantities with one entry per frame."""
     down = np.array([1.0, -1.0])
     shift = cavity.shift * (1.0, -1.0, -180.0 / math.pi)
     reach = np.abs(shift[:, 0]).max() + _WALL + 2.0

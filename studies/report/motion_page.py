@@ -1,4 +1,4 @@
-"""The player of a motion as a page of its own: one document without requests, for a frame of another page."""
+"""The player of a motion as a separate page: one document without requests, for a frame of another page."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pathlib import Path
 import jinja2
 
 from vanedamp.studies.headline import format_value
-from vanedamp.studies.report.motion import Motion
+from vanedamp.studies.report.motion import RunFrames
 
 _FOLDER = Path(__file__).parent
 
 
-def motion_page(motion: Motion, remark: str = "") -> str:
+def motion_page(motion: RunFrames, remark: str = "") -> str:
     """Return the document that plays a motion, with a remark below it."""
     return _template().render(motion=motion, data=motion.to_json(), script=_script(), remark=remark)
 

@@ -1,4 +1,4 @@
-"""The report: results in, one HTML page out that needs no network."""
+"""The report: one HTML page of results that needs no network."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from vanedamp.files.store import csv_text, decoding, digest, replacing
 from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.hot_spots import plus_minus
 from vanedamp.studies.report.charts import Chart, chart
-from vanedamp.studies.report.claims import CLAIMS, Study
-from vanedamp.studies.report.motion import Motion
+from vanedamp.studies.report.claims import CLAIMS, ClaimStudy
+from vanedamp.studies.report.motion import RunFrames
 from vanedamp.studies.report.motion_page import environment
-from vanedamp.studies.report.results import Result, Results, Section, format_setting, sections
+from vanedamp.studies.report.results import ReportSection, Result, Results, format_setting, sections
 from vanedamp.studies.report.summary import summary
 
 _FOLDER = Path(__file__).parent
-#: scenes that a table can have side by side; more stand below each other
+#: largest number of scenes in the columns of a table; more are listed below each other
 _MOST_COLUMNS = 4
-#: headings of what templates of several sections move to one, by their calls, in the order of the page
+#: headings of common sections, filled by templates of several sections, by their calls, in the order of the page
 _COMMON = {"strength": "Strength and life", "later": "Where the energy goes"}
 #: scripts of the page by the kind of chart that needs them
 _SCRIPTS = {"motion.js": "motion", "modes.js": "mode", "curves.js": "response", "ring.js": "ring"}
@@ -45,7 +45,7 @@ _SLIDERS = (
 
 @dataclass(frozen=True)
 class Page:
-    """A page while its sections are written.
+    """The state of a page while its sections are written.
 
     known   the sections by the kind of result that they show
     names   short names of the result files by path
@@ -55,7 +55,7 @@ class Page:
     """
 
     results: Results
-    known: Mapping[str, Section]
+    known: Mapping[str, ReportSection]
     names: Mapping[str, str]
     environment: jinja2.Environment
     study: str | None = None
@@ -70,7 +70,7 @@ class Page:
         self.charts[kind] += 1
         return chart(name, figure, header, rows, files)
 
-    def motion(self, motion: Motion, files: Iterable[str]) -> Chart:
+    def motion(self, motion: RunFrames, files: Iterable[str]) -> Chart:
         """Return the player of a motion for the template's macro `plot`."""
         name = f"motion-{self.charts['motion']}"
         self.charts["motion"] += 1
@@ -78,18 +78,18 @@ class Page:
         return Chart(name, html, csv_text(motion.header(), motion.rows()), tuple(files))
 
     def blocks(self) -> str:
-        """Return the sections of all results, as HTML; those of a study have its title."""
-        studies: list[tuple[Study | None, set[str]]] = [
+        """Return the sections of all results, as HTML; sections of a study have its title."""
+        studies: list[tuple[ClaimStudy | None, set[str]]] = [
             (result.record, set(self.results.parts(file))) for file, result in self.results.kinds[CLAIMS].items()
         ]
-        own = set(self.results.by_file).difference(*(files for _, files in studies))
+        unclaimed = set(self.results.by_file).difference(*(files for _, files in studies))
         blocks = []
         for kind, section in sorted(self.known.items(), key=lambda item: item[0] == CLAIMS):  # the claims come last
             if kind == CLAIMS:
                 blocks.append(self._common_sections())
             moves = {name: partial(self._put_off, name) for name in _COMMON}
             template = Path(getattr(section, "TEMPLATE", section.__file__)).with_suffix(".html")
-            for study, files in [(None, own), *studies]:
+            for study, files in [(None, unclaimed), *studies]:
                 results = {file: result for file, result in self.results.kinds[kind].items() if file in files}
                 if results:
                     name, title, not_ok = (None, "", "") if study is None else (study.study, study.title, study.not_ok)
@@ -99,17 +99,17 @@ class Page:
         return "".join(blocks)
 
     def _put_off(self, section: str, caller: Callable[[], str]) -> str:
-        """Keep a piece of a template for a common section."""
+        """Store a piece of a template for a common section."""
         self.common[section].append(caller())
         return ""
 
     def _common_sections(self) -> str:
-        """Return the pieces that were put off, below their headings."""
-        parts = ([f"<h2>{_COMMON[name]}</h2>", *pieces] for name, pieces in self.common.items() if pieces)
-        return "".join(itertools.chain.from_iterable(parts))
+        """Return the stored pieces, below their headings."""
+        sections = ([f"<h2>{_COMMON[name]}</h2>", *pieces] for name, pieces in self.common.items() if pieces)
+        return "".join(itertools.chain.from_iterable(sections))
 
 
-def _shown(section: Section, results: Mapping[str, Result], page: Page) -> Any:
+def _shown(section: ReportSection, results: Mapping[str, Result], page: Page) -> Any:
     """Return the data of a section's template."""
     if hasattr(section, "section"):
         return section.section(results, page)
@@ -170,12 +170,12 @@ def _environment(names: Mapping[str, str]) -> jinja2.Environment:
 
 
 def _anchor(name: str) -> str:
-    """Return the place of the page that has the provenance of a file."""
+    """Return the anchor of the provenance of a file."""
     return "from-" + re.sub(r"\W", "-", name)
 
 
 def _provenance(results: Results) -> dict[tuple[str, ...], dict[str, str]]:
-    """Return the facts of every file, by its path, and common ones by those of several; of the page itself by none."""
+    """Return the facts of files by the paths that they apply to; facts of the page itself have no path."""
     mine = versions()
     facts = {
         file: {
@@ -187,13 +187,13 @@ def _provenance(results: Results) -> dict[tuple[str, ...], dict[str, str]]:
         if result.provenance is not None
     }
     groups = {(): mine, **_by_owners(facts)}
-    for file in facts:  # equal files have their places, too
+    for file in facts:  # also for files with equal facts
         groups.setdefault((file,), {})["sha256"] = digest(file)
     return groups
 
 
 def _by_owners(tables: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, ...], dict[str, str]]:
-    """Return the entries of tables by the names of all that have them; those of many first."""
+    """Return the entries of tables by the names of all tables with them; the most common ones first."""
     owners: dict[tuple[str, str], tuple[str, ...]] = {}
     for name, table in tables.items():
         for entry in table.items():
@@ -205,13 +205,13 @@ def _by_owners(tables: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, ...],
 
 
 def _compared(scenes: Mapping[str, dict[str, str]]) -> dict[str, Any]:
-    """Return what all scenes have in common, by key, and the keys in which they differ."""
+    """Return the common values of all scenes, by key, and the keys in which they differ."""
     keys = dict.fromkeys(key for scene in scenes.values() for key in scene)
     values = {key: [scene.get(key, "") for scene in scenes.values()] for key in keys}
-    common = {key: same[0] for key, same in values.items() if len(set(same)) == 1}
+    common = {key: entries[0] for key, entries in values.items() if len(set(entries)) == 1}
     differing = [key for key in keys if key not in common]
-    own = {name: {key: scene[key] for key in differing if key in scene} for name, scene in scenes.items()}
-    return {"common": common, "differing": differing, "most_columns": _MOST_COLUMNS, "owners": _by_owners(own)}
+    different = {name: {key: scene[key] for key in differing if key in scene} for name, scene in scenes.items()}
+    return {"common": common, "differing": differing, "most_columns": _MOST_COLUMNS, "owners": _by_owners(different)}
 
 
 def _flat(data: Any, path: str = "") -> dict[str, str]:

@@ -21,7 +21,7 @@ from vanedamp.studies.report.mode_chart import deformed, screen_of, sharp_edges,
 if TYPE_CHECKING:
     from vanedamp.studies.report.forced_response import ForcedResponse
 
-#: part of the light that comes from all sides
+#: fraction of ambient light
 _AMBIENT = 0.55
 
 
@@ -40,15 +40,15 @@ def mode_picture(modes_file: str | Path, mode: int) -> bytes | None:
     screen = screen_of(away)
     moved, magnitude = deformed(points, shape)
     triangles, facing = moved[corners], unit_normals(moved, corners) @ away
-    # painted from the far to the near; what looks away is hidden by what does not
+    # painted from far to near; triangles facing away are hidden
     order = np.argsort(triangles.mean(axis=1) @ away, kind="stable")
-    seen = order[facing[order] > 0.0]
-    colours = colormaps["viridis"](magnitude[corners[seen]].mean(axis=1))
-    colours[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing[seen])[:, None]
+    visible = order[facing[order] > 0.0]
+    colours = colormaps["viridis"](magnitude[corners[visible]].mean(axis=1))
+    colours[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing[visible])[:, None]
     figure, axes = subplots(size=(12.5, 7.5))
     edges = points[sharp_edges(points, corners)] @ screen
     axes.add_collection(LineCollection(list(edges), colors="#9aa0a6", linewidths=0.8))
-    painted = PolyCollection(triangles[seen] @ screen, facecolors=colours, edgecolors=colours, linewidths=0.3)
+    painted = PolyCollection(triangles[visible] @ screen, facecolors=colours, edgecolors=colours, linewidths=0.3)
     axes.add_collection(painted)
     axes.autoscale_view()
     axes.set_aspect("equal")

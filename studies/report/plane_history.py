@@ -1,4 +1,4 @@
-"""Samples of bodies for a drawing in the plane: of a file, or of sliders; impacts by body, surface and corner."""
+"""Samples of bodies for a drawing in the plane, from a file or of sliders; impacts by body, surface and corner."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SURFACES = {
     "body": ("next body", {-1: ""}),
     "stop": ("stop", {-1: ""}),
 }
-#: fraction of its free travel within which a body touches
+#: a body touches a wall within this fraction of its free travel
 _TOUCHES = 1e-9
 
 
@@ -56,17 +56,17 @@ def impacts_by_place(response: Response, scene: Scene | None = None) -> list[Imp
     """
     if response.tilt_max is None:
         return []
-    begin, found = response.transient / response.frequency, dict[tuple[int, str, int], list[Event]]()
+    begin, events_at = response.transient / response.frequency, dict[tuple[int, str, int], list[Event]]()
     for event in response.event_list:
         if event.kind == "impact" and event.time >= begin:
-            found.setdefault((event.damper, event.side, event.corner), []).append(event)
+            events_at.setdefault((event.damper, event.side, event.corner), []).append(event)
     return [
         ImpactsAtPlace(
-            *place, _four(scene, place[0]), len(met), normal_impulse=sum(event.impulse for event in met),
-            tangential_impulse=sum(abs(event.tangential_impulse) for event in met),
-            loss=sum(event.loss for event in met),
+            *contact, _four(scene, contact[0]), len(events), normal_impulse=sum(event.impulse for event in events),
+            tangential_impulse=sum(abs(event.tangential_impulse) for event in events),
+            loss=sum(event.loss for event in events),
         )
-        for place, met in sorted(found.items(), key=lambda item: (item[0][0], *_walk(item[0][1], item[0][2])))
+        for contact, events in sorted(events_at.items(), key=lambda item: (item[0][0], *_walk(item[0][1], item[0][2])))
     ]  # fmt: skip
 
 
@@ -78,18 +78,18 @@ def _four(scene: Scene | None, body: int) -> bool:
 
 
 def _walk(side: str, corner: int) -> tuple[int, int]:
-    """Return the position of a contact in a counterclockwise walk through the cavity."""
+    """Return the position of a contact in counterclockwise order through the cavity."""
     corners = list(_SURFACES.get(side, ("", {}))[1])
     return [*_SURFACES, side].index(side), corners.index(corner) if corner in corners else len(corners) + corner
 
 
 def places_in_order(impacts: Sequence[ImpactsAtPlace]) -> list[str]:
-    """Return the places of impacts, in the order of a counterclockwise walk through the cavity."""
-    return list(dict.fromkeys(each.place for each in sorted(impacts, key=lambda each: _walk(each.side, each.corner))))
+    """Return the names of contacts with impacts, counterclockwise through the cavity."""
+    return list(dict.fromkeys(site.place for site in sorted(impacts, key=lambda site: _walk(site.side, site.corner))))
 
 
 def slider_samples(scene: Scene, displacement: np.ndarray, along: np.ndarray) -> PlanarSamples:
-    """Return the samples of sliders between walls that keep their places on the floor.
+    """Return the samples of sliders between walls that are fixed to the floor.
 
     scene: without open choices; displacement: (n,) m at excitation.at; along: (n, b) m in the cavities. A floor that
     is another point of a reduced model moves as in the mode nearest to the excitation.
@@ -100,11 +100,11 @@ def slider_samples(scene: Scene, displacement: np.ndarray, along: np.ndarray) ->
         row = [k for k, damper in enumerate(scene.damper) if damper.cavity == cavity.name]
         if not row:
             continue
-        places = np.column_stack(
+        positions = np.column_stack(
             [np.full(len(along), -cavity.gap / 2), along[:, row], np.full(len(along), cavity.gap / 2)]
         )
         sides = [(row[0], "left", -1), *((k, "body", -1) for k in row[:-1]), (row[-1], "right", -1)]
-        gaps.append(np.diff(places, axis=1))
+        gaps.append(np.diff(positions, axis=1))
         closed.append(gaps[-1] <= _TOUCHES * cavity.gap)
         contacts += sides
     return PlanarSamples(
@@ -115,9 +115,9 @@ def slider_samples(scene: Scene, displacement: np.ndarray, along: np.ndarray) ->
 
 
 def _floor_shares(scene: Scene) -> np.ndarray:
-    """Return by how much the floor under each body (b,) moves when the response moves by one."""
+    """Return the displacement of the floor under each body (b,) per unit of the response."""
     system = assemble(scene)
-    if not system.modes:  # the base moves, and all on it
+    if not system.modes:  # everything moves with the base
         return np.ones(system.bodies)
     nearest = int(np.argmin(np.abs(np.sqrt(system.of_structure.stiffness) - system.omega)))
     at = system.of_structure.response[nearest]

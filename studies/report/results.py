@@ -1,4 +1,4 @@
-"""Results in files, the parts of a report. Each kind is read by its section, or its record (studies.kinds)."""
+"""Results in files, the input of a report. Each kind is read by its section, or its record (studies.kinds)."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ class Result:
 
     @classmethod
     def of(cls, record: Any, scene: Mapping[str, Any] | None = None) -> Result:
-        """Return the result of a record with a provenance, whose scene the page shows by itself."""
+        """Return the result of a record with a provenance, without the scene, which the page shows separately."""
         return cls(
             record, {key: value for key, value in getattr(record, "provenance", {}).items() if key != "scene"}, scene
         )
 
 
-class Section(Protocol):
-    """The contract of a section; studies.kinds says more. Ours leave KIND, and most of them `load`, to their kind."""
+class ReportSection(Protocol):
+    """The contract of a section (see studies.kinds). Our own take KIND, and most of them `load`, from their kind."""
 
     KIND: str
     __file__: str
@@ -57,7 +57,7 @@ class Section(Protocol):
         """Return the template's data of results by the path of their file; page: a studies.report.page.Page."""
 
     def shown(self, file: str, record: Any, page: Any) -> Any:
-        """Return the data of one result: ours have it in place of `section`, where the template's are a list of it."""
+        """Return the data of one result: our own have this instead of `section`; the template then gets a list."""
 
 
 @dataclass(frozen=True)
@@ -93,66 +93,66 @@ class Results:
         return [path for path in paths if path in results and not results[path].parts]
 
 
-def sections() -> dict[str, Section]:
+def sections() -> dict[str, ReportSection]:
     """Return the sections by the kind of result that they show, in the order of the page. Raises ExtensionError."""
-    known: dict[str, Section] = {}
+    by_kind: dict[str, ReportSection] = {}
     for section in SECTIONS.all().values():
         kind = getattr(section, "KIND", None) or _folder(section).NAME
-        if kind in known:
-            files = f"{known[kind].__file__} and {section.__file__}"
+        if kind in by_kind:
+            files = f"{by_kind[kind].__file__} and {section.__file__}"
             raise ExtensionError(f"two sections of the report show results of the kind {kind}: {files}")
-        known[kind] = section
-    return known
+        by_kind[kind] = section
+    return by_kind
 
 
 def short_names(paths: Iterable[str]) -> dict[str, str]:
-    """Return the shortest ends of paths that distinguish them: file names, with folders where names are the same."""
-    parts = {path: Path(path).resolve().parts for path in paths}
+    """Return the shortest unique ends of paths: file names, with folders where names are equal."""
+    components = {path: Path(path).resolve().parts for path in paths}
     names = {}
-    for path, mine in parts.items():
+    for path, mine in components.items():
         length = 1
-        while any(other[-length:] == mine[-length:] for key, other in parts.items() if other != mine):
+        while any(other[-length:] == mine[-length:] for key, other in components.items() if other != mine):
             length += 1
         names[path] = "/".join(mine[-length:])
     return names
 
 
 def collect(paths: Sequence[str | Path]) -> Results:
-    """Read the results in files, and in all files of folders that may hold any (others there are passed over).
+    """Read the results in files, and in all files of folders that may contain any (other files there are ignored).
 
-    Raises InputError for any other file, and when there is nothing to report.
+    Raises InputError for any other file, and if there is nothing to report.
     """
-    known = sections()
-    results = Results({kind: {} for kind in known})
+    by_kind = sections()
+    results = Results({kind: {} for kind in by_kind})
     for path in map(Path, paths):
         if not path.exists():
             raise InputError(f"{path}: no such file or folder")
-        for file in _candidates(path, known) if path.is_dir() else [path]:
-            kind = _kind(file, known)
-            if kind in known:
-                with contextlib.nullcontext() if kind in _endings(known) else decoding(file):
-                    results.kinds[kind][str(file)] = _loaded(known[kind], file)
+        for file in _candidates(path, by_kind) if path.is_dir() else [path]:
+            kind = _kind(file, by_kind)
+            if kind in by_kind:
+                with contextlib.nullcontext() if kind in _endings(by_kind) else decoding(file):
+                    results.kinds[kind][str(file)] = _loaded(by_kind[kind], file)
             elif not path.is_dir():
-                raise InputError(f"{file}: holds no result that a report shows ({', '.join(known)})")
+                raise InputError(f"{file}: holds no result that a report shows ({', '.join(by_kind)})")
     if not results.files:
-        raise InputError(f"{', '.join(map(str, paths))}: no results that a report shows ({', '.join(known)})")
+        raise InputError(f"{', '.join(map(str, paths))}: no results that a report shows ({', '.join(by_kind)})")
     return results
 
 
-def _loaded(section: Section, path: Path) -> Result:
+def _loaded(section: ReportSection, path: Path) -> Result:
     if hasattr(section, "load"):
         return section.load(path)
     record = pkgutil.resolve_name(_folder(section).RECORD).load(path)
     return Result.of(record, _scene(record))
 
 
-def _folder(section: Section) -> Any:
+def _folder(section: ReportSection) -> Any:
     """Return the kind of a section of ours (studies.kinds)."""
     return import_module(section.__package__)
 
 
 def _scene(record: Any) -> dict[str, Any] | None:
-    """Return the scene of a record as data, with its axes in short; None: it has none."""
+    """Return the scene of a record as data, with abbreviated axes; None without a scene."""
     scene, axes = getattr(record, "scene", None), getattr(record, "axes", {})
     short = {
         path: f"{len(values)} values, {format_setting(values[0])} to {format_setting(values[-1])}"
@@ -172,7 +172,7 @@ def _endings(kinds: Iterable[str]) -> list[str]:
 
 
 def _candidates(folder: Path, kinds: Iterable[str]) -> list[Path]:
-    """Return the files of a folder that may be results; half-written ones of killed commands are hidden."""
+    """Return the files of a folder that may be results, without hidden ones, which killed commands left incomplete."""
     files = [file for ending in (".h5", *_endings(kinds)) for file in sorted(folder.glob(f"*{ending}"))]
     return [file for file in files if not file.name.startswith(".")]
 

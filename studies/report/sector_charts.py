@@ -1,4 +1,4 @@
-"""Rings in a report: amplitudes and impacts over the sectors, of runs and of sweeps."""
+"""Rings in a report: amplitudes and impacts by sector, of runs and of sweeps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _QUANTILES = (0.05, 0.5, 0.95)
 
 
 def sectors_shown(file: str, sectors: Mapping[str, Any], page: Page) -> dict[str, Any]:
-    """Return what a run of a ring shows, from the `sectors` of its JSON."""
+    """Return the template's data of a run of a ring, from `sectors` of its JSON."""
     columns = {name: np.array(sectors[name], float) for name in BY_SECTOR}
     rows = ([sector, *values] for sector, values in enumerate(zip(*columns.values(), strict=True)))
     chart = page.chart("sectors", sectors_figure(columns), ("sector", *columns), rows, [file])
@@ -64,7 +64,7 @@ def sectors_figure(columns: Mapping[str, np.ndarray]) -> go.Figure:
 
 
 def ring_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    """Return what a sweep of a ring shows: a map of its sectors, their impacts, and quantiles over seeds."""
+    """Return the template's data of a sweep of a ring: a map of its sectors, impacts, and quantiles over seeds."""
     shown: dict[str, Any] = {"file": file, "sentence": ring_sentence(sweep), "map": None, "seeds": list(_seeds(sweep))}
     if (across := _across(sweep)) is not None:
         drawn = _panels(sweep, across)
@@ -85,13 +85,13 @@ def ring_shown(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
 
 
 def ring_sentence(sweep: Sweep) -> str:
-    """Return where a sweep of a ring has its largest amplitude, in words."""
+    """Return a sentence on the largest amplitude of a sweep of a ring."""
     mean = _ok(sweep, "sector_amplitude_mean")
     if not np.isfinite(mean).any():
         return "no point is ok, and none has a largest sector"
     *point, sector = np.unravel_index(int(np.nanargmax(mean)), mean.shape)
     axes = zip(sweep.axes.items(), point, sweep.units().values(), strict=True)
-    where = ", ".join(setting(path, values[place], unit) for (path, values), place, unit in axes)
+    where = ", ".join(setting(path, values[index], unit) for (path, values), index, unit in axes)
     text = f"largest mean amplitude {1e6 * np.nanmax(mean):.4g} µm in sector {sector} of {mean.shape[-1]} at {where}"
     ratio, uneven = (float(sweep.sectors[name][tuple(point)]) for name in ("amplification", "localisation"))
     if np.isfinite(ratio):
@@ -105,7 +105,7 @@ def _ok(sweep: Sweep, name: str) -> np.ndarray:
 
 
 def _across(sweep: Sweep) -> str | None:
-    """Return the axis of the map: that of resonances, or else the longest of numbers; None without any."""
+    """Return the axis of the map: that of resonances, or else the longest numeric axis; None without any."""
     numeric = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and len(values) > 1]
     swept = resonance_axis(sweep.scene, numeric)[0]
     return swept if swept is not None else max(numeric, key=lambda path: len(sweep.axes[path]), default=None)
@@ -119,8 +119,8 @@ def _panels(sweep: Sweep, across: str) -> list[Panel]:
 def _spread(impacts: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
     """Yield number, mean, least and most impacts per period of each sector, over points (k, N)."""
     for sector, values in enumerate(impacts.T):
-        known = values[np.isfinite(values)]
-        yield (sector, *((known.mean(), known.min(), known.max()) if known.size else (np.nan,) * 3))
+        finite = values[np.isfinite(values)]
+        yield (sector, *((finite.mean(), finite.min(), finite.max()) if finite.size else (np.nan,) * 3))
 
 
 def _impacts_figure(rows: Sequence[tuple[int, float, float, float]]) -> go.Figure:
@@ -145,16 +145,16 @@ def _seeds(sweep: Sweep) -> Iterator[dict[str, Any]]:
     if swept is not None:
         ratio = ratio.max(axis=paths.index(swept), keepdims=True)
     ratio = np.moveaxis(ratio, paths.index(_SEED), -1)
-    others = [path for path in paths if path not in (_SEED, swept)]
-    combinations = itertools.product(*(range(len(sweep.axes[path])) for path in others))
+    other_paths = [path for path in paths if path not in (_SEED, swept)]
+    combinations = itertools.product(*(range(len(sweep.axes[path])) for path in other_paths))
     for combination, values in zip(combinations, ratio.reshape(-1, ratio.shape[-1]), strict=True):
-        known = values[np.isfinite(values)]
-        if known.size:
-            named = zip(others, combination, strict=True)
-            name = ", ".join(setting(path, sweep.axes[path][place], units[path]) for path, place in named)
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            named = zip(other_paths, combination, strict=True)
+            name = ", ".join(setting(path, sweep.axes[path][index], units[path]) for path, index in named)
             yield {
                 "name": name,
-                "count": known.size,
-                "largest": known.max(),
-                "quantiles": [quantile(known, one) for one in _QUANTILES],
+                "count": finite.size,
+                "largest": finite.max(),
+                "quantiles": [quantile(finite, probability) for probability in _QUANTILES],
             }

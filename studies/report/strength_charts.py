@@ -20,7 +20,7 @@ CURVES = {"with the bodies": "solid", "without bodies": "dot", "bodies fixed": "
 
 
 class SpotPoint(NamedTuple):
-    """A hot spot in the figures: its name, amplitude and mean of the stress that counts, Pa, and fatigue data."""
+    """A hot spot in the figures: name, amplitude and mean of its equivalent stress, Pa, and fatigue data."""
 
     name: str
     amplitude: float
@@ -39,11 +39,11 @@ class SpotLife(NamedTuple):
 def stress_figure(x: np.ndarray, title: str, curves: Mapping[str, Mapping[str, np.ndarray]]) -> go.Figure:
     """Draw amplitudes of von Mises stress (n,), Pa, over an axis with its title: by hot spot, by names of CURVES."""
     figure = go.Figure()
-    for place, (name, own) in enumerate(curves.items()):
-        for curve, values in own.items():
+    for number, (name, of_spot) in enumerate(curves.items()):
+        for curve, values in of_spot.items():
             figure.add_scatter(
                 x=x, y=_MPA * values, mode="lines", name=f"{name} {curve}", legendgroup=name,
-                line={"color": COLOURS[place % len(COLOURS)], "dash": CURVES[curve]},
+                line={"color": COLOURS[number % len(COLOURS)], "dash": CURVES[curve]},
                 hovertemplate=f"{name}, {curve}: %{{y:.4g}} MPa<extra></extra>",
             )  # fmt: skip
     figure.update_xaxes(title_text=title)
@@ -54,8 +54,8 @@ def stress_figure(x: np.ndarray, title: str, curves: Mapping[str, Mapping[str, n
 def lines_figure(x: np.ndarray, title: str, values: np.ndarray, names: Sequence[str], label: str) -> go.Figure:
     """Draw named columns (n, k) over an axis with its title; label: of the values, with their unit."""
     figure = go.Figure()
-    for place, (name, column) in enumerate(zip(names, values.T, strict=True)):
-        colour = COLOURS[place % len(COLOURS)]
+    for number, (name, column) in enumerate(zip(names, values.T, strict=True)):
+        colour = COLOURS[number % len(COLOURS)]
         figure.add_scatter(x=x, y=column, mode="lines", name=name, line={"color": colour}, showlegend=len(names) > 1)
     figure.update_xaxes(title_text=title)
     figure.update_yaxes(title_text=label, rangemode="tozero", exponentformat="power")
@@ -65,19 +65,19 @@ def lines_figure(x: np.ndarray, title: str, values: np.ndarray, names: Sequence[
 def haigh_figure(points: Sequence[SpotPoint]) -> go.Figure:
     """Draw permissible amplitudes over the mean stress and the hot spots, each with its utilisation.
 
-    Materials that differ have a line each; where a yield strength is known, that of yield is dashed.
+    Each material has a line; the yield line is dashed, if the yield strength is known.
     """
     figure = go.Figure()
     materials: dict[Fatigue, None] = dict.fromkeys(point.fatigue for point in points)
-    for place, material in enumerate(materials):
-        own, colour = [point for point in points if point.fatigue == material], COLOURS[place % len(COLOURS)]
-        which = "" if len(materials) == 1 else f" ({', '.join(point.name for point in own)})"
-        _add_lines(figure, material, own, colour, which)
-        used = [float(utilisation(point.amplitude, point.mean, material)) for point in own]
+    for number, material in enumerate(materials):
+        dots, colour = [point for point in points if point.fatigue == material], COLOURS[number % len(COLOURS)]
+        which = "" if len(materials) == 1 else f" ({', '.join(point.name for point in dots)})"
+        _add_lines(figure, material, dots, colour, which)
+        used = [float(utilisation(point.amplitude, point.mean, material)) for point in dots]
         labels = [f"{value:.2f}" if math.isfinite(value) else "beyond the line" for value in used]
         figure.add_scatter(
-            x=[_MPA * point.mean for point in own], y=[_MPA * point.amplitude for point in own], mode="markers+text",
-            text=[f"{point.name}: {label}" for point, label in zip(own, labels, strict=True)], showlegend=False,
+            x=[_MPA * point.mean for point in dots], y=[_MPA * point.amplitude for point in dots], mode="markers+text",
+            text=[f"{point.name}: {label}" for point, label in zip(dots, labels, strict=True)], showlegend=False,
             textposition="top right", marker={"color": colour, "size": 9}, hoverinfo="text",
         )  # fmt: skip
     figure.update_xaxes(title_text="mean stress, MPa", zeroline=True, zerolinecolor="#64748b")
@@ -106,7 +106,7 @@ def _add_lines(figure: go.Figure, material: Fatigue, points: Sequence[SpotPoint]
 def lives_figure(lives: Sequence[SpotLife], unit: str = "h") -> go.Figure:
     """Draw the median lives of hot spots with their quantiles from 10 % to 90 % failure; unit: "h", "starts" ...
 
-    Hot spots without damage are named as such.
+    Hot spots without damage are labelled as such.
     """
     figure = go.Figure()
     for spot in lives:

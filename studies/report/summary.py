@@ -16,7 +16,7 @@ from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.hot_spots import plus_minus
-from vanedamp.studies.report.designs import Design, designs
+from vanedamp.studies.report.designs import DesignCurves, designs
 from vanedamp.studies.report.forced_response import forced_responses, linear_curves, model_name
 from vanedamp.studies.report.forced_response_charts import responses_figure
 from vanedamp.studies.report.map_chart import has_responses
@@ -30,14 +30,14 @@ def summary(results: Results, page: Any) -> dict[str, Any]:
     """Return picture and facts of the structure, the bodies, and the answer; page: a studies.report.page.Page."""
     answer: list[str] = []
     scene, chart = None, None
-    found = [
+    responses = [
         replace(response, source=file)
         for file, result in results.kinds["sweep"].items()
         if has_responses(result.record)
         for response in forced_responses(result.record)
     ]
-    if found:
-        judged = designs(found)
+    if responses:
+        judged = designs(responses)
         best = judged[0].worst
         sweep = results.kinds["sweep"][best.source].record
         scene = base_scene(sweep.scene).replace(best.settings)
@@ -89,7 +89,7 @@ def _structure(results: Results, scene: Scene | None) -> tuple[str | None, dict[
 
 
 def _bodies(scene: Scene, mass: float) -> Iterator[str]:
-    """Yield a line per cavity with bodies; mass: that they are compared with, kg, nan where it is not known."""
+    """Yield one line per cavity with bodies; mass: reference for their masses, kg, nan if unknown."""
     for cavity in scene.cavity:
         inside = [damper for damper in scene.damper if damper.cavity == cavity.name]
         play = "" if cavity.play is None else f", play {1e6 * cavity.play:.4g} µm"
@@ -103,35 +103,35 @@ def _bodies(scene: Scene, mass: float) -> Iterator[str]:
             yield f"Cavity {cavity.name}, gap {1e6 * cavity.gap:.4g} µm{play}: {'; '.join(words)}."
 
 
-def _answer(design: Design, count: int) -> list[str]:
+def _answer(design: DesignCurves, count: int) -> list[str]:
     """Return sentences on the best of a number of designs, by its worst curve."""
-    best, found = design.worst, design.worst.headline
+    best, headline = design.worst, design.worst.headline
     which = f"The best of {count} designs" if count > 1 else "The design"
     unit = "" if best.units == "1" else f" {best.units}"
-    if not math.isfinite(found.peak_ratio):
+    if not math.isfinite(headline.peak_ratio):
         return [f"{design.sentence}."]
-    at = f"{format_value(found.damped_peak_at)}{unit}"
+    at = f"{format_value(headline.damped_peak_at)}{unit}"
     first = (
-        f"{which} ({best.name}): with the bodies the highest mean amplitude is {1e6 * found.damped_peak:.4g} µm "
-        f"at {at}, the largest amplitude {1e6 * found.damped_maximum:.4g} µm, "
-        f"without them {1e6 * found.undamped_peak:.4g} µm at {format_value(found.undamped_peak_at)}{unit}: "
-        f"{found.peak_ratio:.1%} is left, at its largest {found.maximum_ratio:.1%}"
+        f"{which} ({best.name}): with the bodies the highest mean amplitude is {1e6 * headline.damped_peak:.4g} µm "
+        f"at {at}, the largest amplitude {1e6 * headline.damped_maximum:.4g} µm, "
+        f"without them {1e6 * headline.undamped_peak:.4g} µm at {format_value(headline.undamped_peak_at)}{unit}: "
+        f"{headline.peak_ratio:.1%} is left, at its largest {headline.maximum_ratio:.1%}"
     )
     onset = "The bodies hit no wall"
-    if found.onset is not None:
-        known = best.x[np.isfinite(best.damped_mean)]
+    if headline.onset is not None:
+        ok_x = best.x[np.isfinite(best.damped_mean)]
         first_point = ""
-        if found.onset == known[0]:
-            first_point = " or below, the first point" + (" that is ok" if known[0] != best.x[0] else "")
-        onset = f"{best.onset_of.capitalize()} begin at {format_value(found.onset)}{unit}{first_point}"
-    if found.touched_below is not None:
-        onset += f"; below, from {format_value(found.touched_below)}{unit} on, a body hits its floor or ceiling"
+        if headline.onset == ok_x[0]:
+            first_point = " or below, the first point" + (" that is ok" if ok_x[0] != best.x[0] else "")
+        onset = f"{best.onset_of.capitalize()} begin at {format_value(headline.onset)}{unit}{first_point}"
+    if headline.touched_below is not None:
+        onset += f"; below, from {format_value(headline.touched_below)}{unit} on, a body hits its floor or ceiling"
     second = (
-        f"{onset}; with the bodies fixed the maximum would be {1e6 * found.fixed_peak:.4g} µm at "
-        f"{format_value(found.fixed_peak_at)}{unit}."
+        f"{onset}; with the bodies fixed the maximum would be {1e6 * headline.fixed_peak:.4g} µm at "
+        f"{format_value(headline.fixed_peak_at)}{unit}."
     )
     first = "; ".join([first, *design.remarks]) + "."
-    return [first, "; ".join([second.removesuffix("."), *found.remarks_in(best.units)]) + "."]
+    return [first, "; ".join([second.removesuffix("."), *headline.remarks_in(best.units)]) + "."]
 
 
 def _of_run(measures: Any) -> str:

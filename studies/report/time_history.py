@@ -18,7 +18,7 @@ from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.studies.report.charts import COLOURS, DASHES, dressed
-from vanedamp.studies.report.motion import Motion, motion_of
+from vanedamp.studies.report.motion import RunFrames, motion_of
 from vanedamp.studies.report.plane_history import (
     ImpactsAtPlace,
     impacts_by_place,
@@ -32,7 +32,7 @@ _TICKS = 0.07
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class TimeHistory:
     """Samples of a run and its results.
 
     time          (n,) s, as sampled; displacement (n,) m at excitation.at
@@ -56,13 +56,13 @@ class History:
     scene: Scene | None
 
     @classmethod
-    def load(cls, path: str | Path) -> History:
+    def load(cls, path: str | Path) -> TimeHistory:
         """Read what `vanedamp run` wrote. Raises files.store.StoreError."""
         return cls.of(Response.load(path))
 
     @classmethod
-    def of(cls, response: Response, scene: Scene | None = None) -> History:
-        """Return the history of a run; scene: that of a response that does not say."""
+    def of(cls, response: Response, scene: Scene | None = None) -> TimeHistory:
+        """Return the history of a run; scene: for a response without its own."""
         impacts = (event for event in response.event_list if event.kind == "impact")
         whole, bodies = _unrolled(response.scene or scene), response.body_displacement  # in a file none without bodies
         return cls(
@@ -92,13 +92,13 @@ class History:
         """Number of the body of each impact (m,), -1: the structure's on a stop."""
         return np.array([body if meets_body(side) else -1 for _, (body, side, _) in self.hits], int)
 
-    def late(self) -> History:
-        """Return the last periods only, as many as a page carries."""
+    def late(self) -> TimeHistory:
+        """Return only the last periods, as many as a page can hold."""
         begin = max(self.time[-1] - _MOST_PERIODS * self.period, self.time[-_MOST_SAMPLES:][0])
-        kept = self.time >= begin
-        plane = None if self.plane is None else self.plane.cut(kept)
+        shown = self.time >= begin
+        plane = None if self.plane is None else self.plane.cut(shown)
         return replace(
-            self, time=self.time[kept], displacement=self.displacement[kept], bodies=self.bodies[kept],
+            self, time=self.time[shown], displacement=self.displacement[shown], bodies=self.bodies[shown],
             plane=plane, hits=[hit for hit in self.hits if hit[0] >= begin],
         )  # fmt: skip
 
@@ -112,7 +112,7 @@ class History:
         plane = [] if self.plane is None else [self.plane.body_lift, self.plane.body_tilt]
         yield from np.column_stack([self.time, self.displacement, self.bodies, *plane]).tolist()
 
-    def motion(self) -> Motion | None:
+    def motion(self) -> RunFrames | None:
         """Return the data for the player of the page; None without bodies, or where a reduced model has moved."""
         if self.scene is None or not self.bodies.shape[1]:
             return None
@@ -135,8 +135,8 @@ def _unrolled(scene: Scene | None) -> Scene | None:
         return None
 
 
-def history_figure(history: History) -> go.Figure:
-    """Draw the displacement with a mark at every impact, above the bodies' places between the walls."""
+def history_figure(history: TimeHistory) -> go.Figure:
+    """Draw the displacement with a mark at every impact, above the bodies' positions between the walls."""
     panels = _planar_panels(history)
     rows = 2 + len(panels) if history.bodies.shape[1] else 1
     figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.06)
@@ -187,20 +187,20 @@ def history_figure(history: History) -> go.Figure:
     return dressed(figure, height=280 * rows)
 
 
-def _planar_panels(history: History) -> list[tuple[str, np.ndarray, str]]:
+def _planar_panels(history: TimeHistory) -> list[tuple[str, np.ndarray, str]]:
     """Return title, values (n, bodies) and unit of further panels for bodies in the plane."""
     if history.plane is None:
         return []
     lift, tilt = 1e6 * history.plane.body_lift, 1e3 * history.plane.body_tilt.copy()
     if history.scene is not None:
         discs = np.array([damper.form.rolls for damper in history.scene.damper])
-        if np.isfinite(tilt[:, ~discs]).any():  # next to the turns of discs, tilts would not show
+        if np.isfinite(tilt[:, ~discs]).any():  # rotations of discs would hide tilts
             tilt[:, discs] = np.nan
     return [("above the floor, µm", lift, "µm"), ("tilt, mrad", tilt, "mrad")]
 
 
 def _stops(scene: Scene | None) -> list[float]:
-    """Return where the ground stops the point whose displacement is shown, m."""
+    """Return the positions of stops for the displayed displacement, m."""
     if scene is None:
         return []
     shown = [stop for stop in scene.stop if stop.to is None and stop.at in (None, scene.excitation.at)]
@@ -208,7 +208,7 @@ def _stops(scene: Scene | None) -> list[float]:
 
 
 def _walls(scene: Scene | None) -> list[float]:
-    """Return where the only bodies of their cavities end, m."""
+    """Return the limits of travel of single bodies in their cavities, m."""
     if scene is None:
         return []
     alone = [cavity.gap for cavity in scene.cavity if sum(damper.cavity == cavity.name for damper in scene.damper) == 1]

@@ -17,13 +17,13 @@ from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import load
 from vanedamp.studies.cli import main
 from vanedamp.studies.demo import demo
-from vanedamp.studies.demo.figure_file import Effort, FigureScenes, Structure
+from vanedamp.studies.demo.figure_file import Effort, FigureScenes, FigureStructure
 from vanedamp.studies.demo.figure_study import Session, write_scene
 from vanedamp.studies.report.forced_response import forced_responses
 from vanedamp.studies.worst_start import STARTS
 
 MASS, FREQUENCY, RATIO, AMPLITUDE = 0.157, 2412.0, 0.002, 70e-6
-STRUCTURE = Structure(MASS, MASS * (2 * math.pi * FREQUENCY) ** 2, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
+STRUCTURE = FigureStructure(MASS, MASS * (2 * math.pi * FREQUENCY) ** 2, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
 
 
 def shows_impact_mistuning(response, first, fixed, peak):
@@ -114,7 +114,7 @@ def test_claims_are_of_the_worst_start(rigid):
     """Of each gap and frequency, by the file: the highest mean of the runs that are ok, and the largest amplitude."""
     found = Sweep.load(rigid / "fig9.h5")
     assert found.axes["continuation.direction"].tolist() == list(STARTS)
-    session = Session(Structure.shipped(), rigid, effort=Effort(points=6, starts=tuple(STARTS)))
+    session = Session(FigureStructure.shipped(), rigid, effort=Effort(points=6, starts=tuple(STARTS)))
     ok = found.status == "ok"
     for place, curve in enumerate(session.read(found, "fig9")):
         shown = ok[:, place].any(axis=0)

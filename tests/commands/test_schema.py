@@ -18,7 +18,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.reference import options
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.demo.demo import FIGURES, RIGID_FIGURES
-from vanedamp.studies.demo.figure_file import FigureScenes, Structure
+from vanedamp.studies.demo.figure_file import FigureScenes, FigureStructure
 from vanedamp.studies.file_kinds import KINDS
 
 SHIPPED = [
@@ -68,7 +68,7 @@ def test_shipped_files(path):
 
 @pytest.mark.parametrize("name", RIGID_FIGURES)
 def test_scenes_of_the_paper_s_figures(name):
-    for scene in FigureScenes.load(FIGURES[name].file, Structure.shipped()).scenes.values():
+    for scene in FigureScenes.load(FIGURES[name].file, FigureStructure.shipped()).scenes.values():
         assert faults("scene", scene.to_dict()) == []
 
 

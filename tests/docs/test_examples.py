@@ -28,7 +28,7 @@ from vanedamp.studies.case.external_model import External
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import _parsers, main
 from vanedamp.studies.demo.demo import EFFORT
-from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, Structure
+from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, FigureStructure
 from vanedamp.studies.identification.deviations import load_table
 from vanedamp.studies.identification.tables import IdentificationFile
 from vanedamp.studies.life.study import LifeStudy
@@ -219,7 +219,7 @@ def program(page: str, word: str) -> str:
 
 def test_program_of_the_readme(tmp_path):
     """On the scene that `make demo` leaves, with its effort."""
-    structure = Structure(0.157, 0.157 * (2 * np.pi * 2412.0) ** 2, 0.002, 2412.0, 70e-6, Path("rom.h5"))
+    structure = FigureStructure(0.157, 0.157 * (2 * np.pi * 2412.0) ** 2, 0.002, 2412.0, 70e-6, Path("rom.h5"))
     scene = FigureScenes.load(FOLDER / "fig10.toml", structure, EFFORT).scenes["single"]
     (tmp_path / "out").mkdir()
     scene.save(tmp_path / "out" / "fig10_single.toml")

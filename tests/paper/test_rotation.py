@@ -21,11 +21,11 @@ from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.demo.curve import curves
-from vanedamp.studies.demo.figure_file import Effort, Structure
+from vanedamp.studies.demo.figure_file import Effort, FigureStructure
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
 STIFFNESS = MASS * (2 * math.pi * FREQUENCY) ** 2
-STRUCTURE = Structure(MASS, STIFFNESS, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
+STRUCTURE = FigureStructure(MASS, STIFFNESS, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
 BOTH = ("rotating_body", "self_tuning")
 
 

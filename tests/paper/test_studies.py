@@ -26,14 +26,14 @@ from vanedamp.studies.cli import main
 from vanedamp.studies.demo import figure_study
 from vanedamp.studies.demo.claims import verdict
 from vanedamp.studies.demo.curve import curves
-from vanedamp.studies.demo.figure_file import Effort, Structure, linear_peaks
+from vanedamp.studies.demo.figure_file import Effort, FigureStructure, linear_peaks
 from vanedamp.studies.demo.figure_study import Read
 from vanedamp.studies.jobs import sweep as jobs_sweep
 from vanedamp.studies.report.results import collect
 
 FREQUENCY, MASS, RATIO, AMPLITUDE = 2412.0, 0.157, 0.002, 70e-6
 STIFFNESS = MASS * (2 * math.pi * FREQUENCY) ** 2
-STRUCTURE = Structure(MASS, STIFFNESS, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
+STRUCTURE = FigureStructure(MASS, STIFFNESS, RATIO, FREQUENCY, AMPLITUDE, Path("rom.h5"))
 RIGID = ("fig9", "fig10", "fig14", "fig19", "mistuning", "systems", "blocks", "fit")
 
 
@@ -313,7 +313,7 @@ def test_confidence_goes_with_the_mean():
 def test_modes_without_a_rigid_model_are_refused(tmp_path):
     save(tmp_path / "modes.h5", "modes", {"shape": Variable(np.zeros(2), ("dof",))})
     with pytest.raises(InputError, match="rigid model and a fatigue strength"):
-        Structure.load(tmp_path / "modes.h5", tmp_path / "rom.h5")
+        FigureStructure.load(tmp_path / "modes.h5", tmp_path / "rom.h5")
 
 
 def test_command_refuses_an_unknown_study(tmp_path, capsys):

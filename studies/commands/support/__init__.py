@@ -1,1 +1,1 @@
-"""Shared by several commands: arguments, output files, messages, scenes, a budget."""
+"""Code for several commands: arguments, output files, messages, scenes, a budget."""

@@ -1,4 +1,4 @@
-"""Arguments that several commands take, and the types of their values."""
+"""Arguments of several commands, and the types of their values."""
 
 from __future__ import annotations
 
@@ -73,11 +73,11 @@ budget = argument(
     "--budget", type=seconds, metavar="S",
     help="seconds after which the search ends with what it has found; the same command resumes (default: the study's)",
 )  # fmt: skip
-#: no machine has more cores
+#: more than the cores of any machine
 workers = argument(
     "--workers", type=partial(count, least=1, most=1024), metavar="N", help="processes (default: one for every core)"
 )
-#: leaves out the second runs that say whether results hang on the last bits of a start
+#: omits the second runs that test whether results depend on the last bits of the start
 moved_start = argument(
     "--no-moved-start", action="store_true",
     help="no second run, or of a curve's peak, from bodies about 1e-9 of their gap aside, which should end alike",

@@ -28,7 +28,7 @@ def read_campbell_case(arguments: Namespace) -> Case:
 
 
 def read_reducible_case(arguments: Namespace) -> Case:
-    """Load a case with an interface, for a basis that there is; as read_case."""
+    """Load a case with an interface, for a valid basis; as read_case."""
     case = read_case(arguments)
     if case.ring is None:
         basis_named(arguments.basis)

@@ -1,6 +1,6 @@
-"""Declaration of a command: arguments, inputs, outputs, and its function, which is loaded last.
+"""Declaration of a command: arguments, inputs, outputs, and its function, which is loaded last,
 
-So whatever a user gets wrong is said before the work's packages are imported, and `--help` loads none of them.
+so that errors of the user are reported before heavy packages are imported, and `--help` loads none of them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def argument(*names: str, **options: Any) -> Argument:
 
 @dataclass(frozen=True)
 class Function:
-    """A function or class at a place, module:name, below studies.commands, which is imported when it is called."""
+    """A function or class module:name below studies.commands, which is imported when it is called."""
 
     place: str
     below: str = "commands"
@@ -35,24 +35,24 @@ class Function:
         loaded: Callable[..., Any] = getattr(import_module(f"vanedamp.studies.{self.below}.{module}"), name)
         return loaded
 
-    def __call__(self, *given: Any) -> Any:
+    def __call__(self, *arguments: Any) -> Any:
         """Call it."""
-        return self.load()(*given)
+        return self.load()(*arguments)
 
 
 @dataclass(frozen=True)
 class Command:
     """A command of our own.
 
-    NAME, SUMMARY, ORDER  as `studies.commands` says of all commands
+    NAME, SUMMARY, ORDER  as for all commands (`studies.commands`)
     arguments             in the order of --help
     writes                files of options, each with the endings that they may have: checked before anything is read;
                           None: the work checks
     checkpoint            whether the result has a checkpoint, from which `--resume` continues
     reads                 a function of the arguments that loads and checks the input, before the work is loaded
     takes                 kinds of its input files, by their names in `studies.file_kinds`
-    module                whose function `run` does the work, of the arguments and what `reads` returns; "": NAME's
-    job                   in place of it a class of a job, module:name below studies.jobs
+    module                its function `run` takes the arguments and what `reads` returns; "": the module NAME
+    job                   instead of it the class of a job, module:name below studies.jobs
     """
 
     NAME: str
@@ -84,11 +84,11 @@ class Command:
         if self.writes is not None:
             Function("support.outputs:prepare")(arguments, self.writes, self.checkpoint)
         try:
-            given = () if self.reads is None else (self.reads(arguments),)
+            inputs = () if self.reads is None else (self.reads(arguments),)
             if self.job:
-                Function("support.jobs:run")(arguments, self.work.load(), *given)
+                Function("support.jobs:run")(arguments, self.work.load(), *inputs)
             else:
-                self.work(arguments, *given)
+                self.work(arguments, *inputs)
         except VanedampError:
             self._refuse_other_kinds(arguments)
             raise
@@ -98,7 +98,7 @@ class Command:
         from vanedamp.files.toml_input import InputError
         from vanedamp.studies.file_kinds import another_kind, expected
 
-        given = [getattr(arguments, name, None) for name in ("input", "pipeline")]
-        for path in filter(None, (*given, *getattr(arguments, "inputs", ()))) if self.takes else ():
-            if told := another_kind(path, self.takes):
-                raise InputError(f"{path}: {told}; `vanedamp {self.NAME}` takes {expected(self.takes)}") from None
+        paths = [getattr(arguments, name, None) for name in ("input", "pipeline")]
+        for path in filter(None, (*paths, *getattr(arguments, "inputs", ()))) if self.takes else ():
+            if kind := another_kind(path, self.takes):
+                raise InputError(f"{path}: {kind}; `vanedamp {self.NAME}` takes {expected(self.takes)}") from None

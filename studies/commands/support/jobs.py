@@ -1,4 +1,4 @@
-"""A job by its command: notes before and after it, worker processes, its files, and its checkpoint."""
+"""Run a job from its command: notes before and after it, worker processes, files, and checkpoint."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from vanedamp.studies.jobs.job import Job
 from vanedamp.studies.jobs.workers import available_cores, workers
 
 
-def run(arguments: Namespace, kind: type[Job], *given: Any) -> None:
-    """Run the job of a command line, of what the command has read. Raises VanedampError."""
-    job = kind.of_arguments(arguments, *given)
+def run(arguments: Namespace, kind: type[Job], *inputs: Any) -> None:
+    """Run the job of a command line on the input that the command has read. Raises VanedampError."""
+    job = kind.of_arguments(arguments, *inputs)
     arguments.outputs.keep(job.files)
     count = getattr(arguments, "workers", None)
     job.check(count or available_cores())

@@ -1,4 +1,4 @@
-"""Results of a command: its files, JSON for machines, lines for people, warnings on standard error."""
+"""Results of a command: files, JSON, printed lines, warnings on standard error."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def write_result(
 ) -> None:
     """Write the results of a command. All files appear together, or none.
 
-    result: as JSON to the file of `--json`, or to standard output (-), which takes nothing else then
-    lines: for people, on standard output
+    result: as JSON to the file of `--json`, or alone to standard output (-)
+    lines: printed on standard output
     warnings: about the input file, on standard error
     files: by the option that names the file, if it is given, the function of its path that writes it
     """

@@ -1,4 +1,4 @@
-"""The files of a command: outputs that can be written, that are no inputs, and each a file of its own."""
+"""Checks of a command's files: outputs must be writable, must not be inputs, and must differ from each other."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Outputs(NamedTuple):
     files: tuple[tuple[str, Path], ...]
 
     def keep(self, inputs: Iterable[str | Path]) -> None:
-        """Reject outputs that would take the place of an input. Raises InputError."""
+        """Reject outputs that would overwrite an input. Raises InputError."""
         for (option, path), file in itertools.product(self.files, inputs):
             if path.exists() and os.path.exists(file) and _same(path, Path(file)):
                 raise InputError(f"{option} {path}: is an input ({file}), which would be lost; name another file")
@@ -49,16 +49,16 @@ def prepare(arguments: Namespace, endings: Mapping[str, tuple[str, ...]], checkp
 
 
 def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: tuple[str, ...]) -> Outputs:
-    """Reject files that could not be written, before the work. Raises InputError.
+    """Reject files that cannot be written, before the work begins. Raises InputError.
 
-    The files come from `--output`, from `--json` (standard output becomes `-` and is none), of the options that
-    suffixes names with the endings that they may have, and one that the user did not name (beside).
+    The files come from `--output`, from `--json` (standard output becomes `-` and is no file), from the options in
+    suffixes, each with its permitted endings, and from `beside`, a file that the user did not name.
     """
     if _is_stdout(getattr(arguments, "json", None) or "-"):
         arguments.json = "-"
     named = [(option, getattr(arguments, option, None)) for option in dict.fromkeys(("output", "json", *suffixes))]
-    given = [(option, name) for option, name in (*named, ("output", beside)) if name is not None]
-    outputs = Outputs(tuple((f"--{option}", Path(name)) for option, name in given if (option, name) != ("json", "-")))
+    chosen = [(option, name) for option, name in (*named, ("output", beside)) if name is not None]
+    outputs = Outputs(tuple((f"--{option}", Path(name)) for option, name in chosen if (option, name) != ("json", "-")))
     for option, path in outputs.files:
         trouble = _trouble(path)
         if trouble is not None:
@@ -75,12 +75,12 @@ def check_outputs(arguments: Namespace, beside: Path | None = None, **suffixes: 
             expected = " or ".join(filter(None, endings))
             raise InputError(f"{option} {path}: expected a file name ending in {expected}")
     if any(path.suffix == ".h5" for _, path in outputs.files):
-        importlib.import_module("h5py")  # loaded when a file is written: whoever lacks it is told before the work
+        importlib.import_module("h5py")  # needed to write the file: a missing package is reported before the work
     return outputs
 
 
 def output_folder(arguments: Namespace) -> Path:
-    """Return the folder that a command writes, perhaps not there yet. Raises InputError for a file."""
+    """Return the output folder of a command, which may not exist yet. Raises InputError for a file."""
     folder = Path(arguments.output)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--output {folder}: expected a folder, not a file")
@@ -88,12 +88,12 @@ def output_folder(arguments: Namespace) -> Path:
 
 
 def _checkpoint_file(output: str | None) -> Path | None:
-    """Return where a command keeps what is finished, if its result is a file."""
+    """Return the checkpoint of a command whose result is a file; None without one."""
     return None if output is None or destination(output) is None else Path(f"{output}.partial")
 
 
 def _trouble(path: Path) -> str | None:
-    """Say why a file cannot be written; None where it can."""
+    """Return why a file cannot be written; None if it can."""
     try:
         target = destination(path)
     except OSError as error:
@@ -111,7 +111,7 @@ def _trouble(path: Path) -> str | None:
 
 
 def _same(one: Path, other: Path) -> bool:
-    """Say whether two names are one file; /dev/null takes everything."""
+    """Return whether two names refer to one file; /dev/null may be named twice."""
     if one.exists() and other.exists():
         return os.path.samefile(one, other) and not os.path.samefile(one, os.devnull)
     return os.path.realpath(one) == os.path.realpath(other)

@@ -14,7 +14,7 @@ from vanedamp.studies.scene_checks import check_moved, load_scene
 
 
 def read_scene(arguments: Namespace) -> Scene:
-    """Load the scene of a command, which something moves; as read_any_scene."""
+    """Load the scene of a command and check that it is excited; as read_any_scene."""
     scene = read_any_scene(arguments)
     check_moved(scene)
     return scene
@@ -28,7 +28,7 @@ def read_scene_or_ranges(arguments: Namespace) -> Scene:
 
 
 def read_any_scene(arguments: Namespace, ranges: bool = False) -> Scene:
-    """Load the scene of a command. Its files must be there, and none of them may be an output. Raises InputError.
+    """Load the scene of a command. Its files must exist, and none of them may be an output. Raises InputError.
 
     ranges: whether its numbers may be ranges.
     """

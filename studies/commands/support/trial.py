@@ -1,6 +1,6 @@
-"""The cost of runs, measured: a few periods of each, within a bounded time, and the rest in proportion.
+"""The cost of runs, extrapolated from a few periods of each that are measured within a bounded time.
 
-No formula knows how many events bodies, contact laws and modes make of a period.
+No formula predicts the number of events per period from bodies, contact laws and modes.
 """
 
 from __future__ import annotations
@@ -39,30 +39,30 @@ def mean_cost(scenes: Sequence[Scene], begins: float = RUN) -> float:
     begins: of each in addition to its periods, s. Scenes that cannot run are left out; nan if none can.
     """
     compile_engine([*scenes[:1], *scenes[-1:]])
-    found, left = [], _SECONDS
+    costs, seconds_left = [], _SECONDS
     with stage("trial of the cost"):
         for number, scene in enumerate(scenes):
             begun = time.process_time()
             with suppress(*OF_A_POINT):
-                found.append(begins + _cost(scene, left / (len(scenes) - number)))
-            left = max(left - (time.process_time() - begun), 0.0)
-    return float(np.mean(found)) if found else float("nan")
+                costs.append(begins + _cost(scene, seconds_left / (len(scenes) - number)))
+            seconds_left = max(seconds_left - (time.process_time() - begun), 0.0)
+    return float(np.mean(costs)) if costs else float("nan")
 
 
 def tried(count: int) -> list[int]:
-    """Return the numbers of those of `count` scenes that stand for all: one of each part, at no regular distance."""
+    """Return the indices of scenes that represent all `count`: one at a random position in each of equal intervals."""
     if count <= _SCENES:
         return list(range(count))
-    places = (np.arange(_SCENES) + np.random.default_rng(0).random(_SCENES)) * count / _SCENES
-    return [int(place) for place in places]
+    positions = (np.arange(_SCENES) + np.random.default_rng(0).random(_SCENES)) * count / _SCENES
+    return [int(position) for position in positions]
 
 
 def _cost(scene: Scene, seconds: float) -> float:
     """Return the processor time of the periods of a run, s, from a trial of about `seconds`.
 
-    A run that takes longer is tried from near its steady state: little happens while it begins. Where contacts close in
-    a new combination, the exact engines assemble a subsystem. A second trial, which has them all, tells this cost,
-    which grows as a power of the periods as combinations return, from that of the motion.
+    A longer run is tried from near its steady state, since few events occur at its beginning. Where contacts close in
+    a new combination, the exact engines assemble a contact configuration. A second trial, in which all are assembled,
+    separates this cost, a power of the number of periods as combinations recur, from that of the motion.
     """
     periods = scene.time.simulated
     whole = _follow(run_of(scene), periods, 0.3 * seconds)
@@ -89,22 +89,22 @@ def _follow(run: Run, periods: int, seconds: float, marks: Sequence[int] = ()) -
 
     marks: the numbers of periods, from 0; without them, twice as many each time.
     """
-    begun, found = time.process_time(), [(0, 0.0)]
-    while (done := found[-1][0]) < periods and (found[-1][1] < seconds or len(found) < 4):
-        pace = max(found[-1][1], 1e-6) / max(done, 1)
-        most = int((seconds - found[-1][1]) / pace) if seconds < math.inf else periods
-        target = marks[len(found)] if marks else min(done + min(max(done, 1), max(most, 1)), periods)
+    begun, measured = time.process_time(), [(0, 0.0)]
+    while (done := measured[-1][0]) < periods and (measured[-1][1] < seconds or len(measured) < 4):
+        pace = max(measured[-1][1], 1e-6) / max(done, 1)
+        most = int((seconds - measured[-1][1]) / pace) if seconds < math.inf else periods
+        target = marks[len(measured)] if marks else min(done + min(max(done, 1), max(most, 1)), periods)
         ok = run.advance_to(target) is Status.OK
-        found.append((target, time.process_time() - begun))
+        measured.append((target, time.process_time() - begun))
         if not ok:
-            return [*found, found[-1]]
-    return found
+            return [*measured, measured[-1]]
+    return measured
 
 
 def _near_steady(scene: Scene) -> RestartState | None:
     """Return the linear steady state, of the smaller amplitude without bodies and with bodies fixed.
 
-    None where there is none, or runs of the scene's method cannot begin with it.
+    None if there is none, or if the scene's method cannot start from it.
     """
     if scene.excitation.signal is not None or isinstance(scene.structure, Prescribed) or why_no_restart(scene):
         return None

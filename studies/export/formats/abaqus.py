@@ -9,7 +9,7 @@ import numpy as np
 
 from vanedamp.files.formats.matrices.abaqus import write_substructure
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 from vanedamp.studies.export.reduced_matrices import COORDINATES, DESCRIPTION, write_model
 
 SUMMARY = "a reduced model as a substructure (*USER ELEMENT, *MATRIX): Abaqus"
@@ -18,7 +18,7 @@ OPTIONS = (DESCRIPTION, COORDINATES)
 
 
 def write(
-    record: Record, path: Path, description: str | None = None, coordinates: str | None = None
+    record: ExportRecord, path: Path, description: str | None = None, coordinates: str | None = None
 ) -> tuple[str, ...]:
     """Write stiffness and mass; description: the file by which `vanedamp import` reads them back."""
     return write_model(record, path, coordinates, description, _write, damping=False)

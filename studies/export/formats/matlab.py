@@ -14,7 +14,7 @@ from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.external import plain_matrices
 from vanedamp.studies.export.export import ANY
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 from vanedamp.studies.export.reduced_matrices import DESCRIPTION, describe
 
 SUMMARY = "all variables with units, dimensions and the scene: MATLAB, Octave"
@@ -22,12 +22,12 @@ ENDINGS = (".mat",)
 OPTIONS = (DESCRIPTION,)
 #: bytes of a variable, and letters of a name, that version 5 holds
 _MOST_BYTES, _MOST_LETTERS = 2**31 - 1, 63
-#: texts of a variable that are cells; of more, which would take minutes to read and write, numbers in a list of words
+#: largest number of texts written as cells; more would take minutes and are written as indices in a list of words
 _MOST_CELLS = 10_000
 _RESERVED = {"case", "catch", "end", "function", "otherwise", "parfor", "persistent", "spmd", "switch"}
 
 
-def write(record: Record, path: Path) -> None:
+def write(record: ExportRecord, path: Path) -> None:
     """Write variables under their names, `units` and `dimensions` of each, and the attributes with the scene."""
     from scipy.io import savemat
 
@@ -47,23 +47,23 @@ def write(record: Record, path: Path) -> None:
         elif values.size <= _MOST_CELLS:
             data[name] = _texts(values)
         else:
-            words, places = np.unique(values.astype(str), return_inverse=True)
-            data[name] = 1.0 + places.reshape(values.shape)
+            words, codes = np.unique(values.astype(str), return_inverse=True)
+            data[name] = 1.0 + codes.reshape(values.shape)
             data[f"{name}_names"] = _texts(words)
     data |= {
         "units": _struct({name: item.units for name, item in record.variables.items()}),
         "dimensions": {_name(name): cells for name, cells in dimensions.items()},
     }
     scene = record.attributes.get("scene") or _scene_of(record.attributes.get("provenance"))
-    taken = {_name(name): value for name, value in _unique(record.attributes.items())}
-    data["about"] = _struct({name: value for name, value in taken.items() if name != "scene"})
+    attributes = {_name(name): value for name, value in _unique(record.attributes.items())}
+    data["about"] = _struct({name: value for name, value in attributes.items() if name != "scene"})
     if scene is not None:
         data["scene"] = _struct(scene)
     with replacing(path) as temporary:
         savemat(temporary, dict(_unique(data.items())), long_field_names=True, oned_as="column", do_compression=True)
 
 
-def reduced_model(record: Record, path: Path, description: str | None = None) -> None:
+def reduced_model(record: ExportRecord, path: Path, description: str | None = None) -> None:
     """Write a reduced model; description: the file by which `vanedamp import` reads it back."""
     model = record.reduced_model()
     if description is not None and model.residual_flexibility is not None:
@@ -87,13 +87,13 @@ def _scene_of(provenance: Any) -> Any:
 def _texts(values: np.ndarray) -> np.ndarray:
     """Return texts as MATLAB has them: cells."""
     cells = np.empty(values.shape, dtype=object)
-    for place, text in np.ndenumerate(values):
-        cells[place] = str(text)
+    for index, text in np.ndenumerate(values):
+        cells[index] = str(text)
     return cells
 
 
 def _struct(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return plain data as a struct; one without fields has one, since scipy writes none."""
+    """Return plain data as a struct; an empty one gets a field, since scipy writes no empty structs."""
     return dict(_unique((name, _value(value)) for name, value in data.items())) or {"none": np.zeros((0, 0))}
 
 
@@ -116,20 +116,20 @@ def _cells(items: list[Any]) -> np.ndarray:
 
 
 def _unique(items: Iterable[tuple[str, Any]]) -> Iterable[tuple[str, Any]]:
-    """Yield items under names that MATLAB takes, each once."""
-    seen: set[str] = set()
+    """Yield items under valid and unique MATLAB names."""
+    used: set[str] = set()
     for name, value in items:
-        short = own = _name(name)
+        short = unique = _name(name)
         number = 2
-        while own in seen:
-            own = f"{short[: _MOST_LETTERS - 4]}_{number}"
+        while unique in used:
+            unique = f"{short[: _MOST_LETTERS - 4]}_{number}"
             number += 1
-        seen.add(own)
-        yield own, value
+        used.add(unique)
+        yield unique, value
 
 
 def _name(text: str) -> str:
-    """Return a name as MATLAB takes it: letters, digits and underscores, a letter first, no keyword."""
+    """Return a valid MATLAB name: letters, digits and underscores, a letter first, no keyword."""
     name = re.sub(r"[^0-9A-Za-z_]", "_", text)
     if not name or not name[0].isalpha() or iskeyword(name) or name in _RESERVED:
         name = f"x_{name.lstrip('_')}"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 from vanedamp.studies.export.reduced_matrices import COORDINATES, DESCRIPTION, write_model
 
 SUMMARY = "a reduced model's matrices MAA, KAA, BAA, SELECT, BASE in binary: Nastran, pyyeti"
@@ -19,7 +19,7 @@ _NAMES = {"mass": "MAA", "stiffness": "KAA", "damping": "BAA", "selection": "SEL
 
 
 def write(
-    record: Record, path: Path, description: str | None = None, coordinates: str | None = None
+    record: ExportRecord, path: Path, description: str | None = None, coordinates: str | None = None
 ) -> tuple[str, ...]:
     """Write mass, stiffness and damping (n, n), the interface's rows SELECT (k, n) and the base load BASE (n, 3).
 

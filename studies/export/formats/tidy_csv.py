@@ -1,4 +1,4 @@
-"""Tidy tables: one row per point of a sweep, sample, period, event, mode ...; units stand in the header."""
+"""Tidy tables: one row per point of a sweep, sample, period, event, mode ...; units are in the header."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.files.store import Variable, write_csv
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.export.export import ANY, Option
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 
 SUMMARY = "tables with one row a point, units in the header: pandas, R, spreadsheets"
 ENDINGS = (".csv",)
@@ -29,23 +29,23 @@ _TABLES = {
 }  # fmt: skip
 #: dimension of the Poincare sections of a sweep
 _SECTION = "section"
-#: rows that are made at once, and columns that a variable may have
+#: rows per write, and largest number of columns per variable
 _CHUNK, _MOST_COLUMNS = 4096, 1000
 
 Column = tuple[str, np.ndarray]
 
 
-def sweep(record: Record, path: Path, table: str | None = None) -> None:
-    """Write the grid of a sweep: a row a point, columns of its axes, statuses and measures.
+def sweep(record: ExportRecord, path: Path, table: str | None = None) -> None:
+    """Write the grid of a sweep: one row per point, with columns of axes, statuses and measures.
 
     table: "section" has a row for each Poincare section of every point instead. Raises InputError for other rows, and
     for sections that the sweep has not kept.
     """
     axes: Sequence[str] = record.attributes["axes"]
     dims = tuple(axis.replace(".", "_") for axis in axes)
-    known = ("point", *(name for name in (_SECTION,) if any(name in item.dims for item in record.variables.values())))
-    if table is not None and table not in known:
-        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(known)}")
+    kinds = ("point", *(name for name in (_SECTION,) if any(name in item.dims for item in record.variables.values())))
+    if table is not None and table not in kinds:
+        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(kinds)}")
     rows = (*dims, _SECTION) if table == _SECTION else dims
     on_grid = {
         name: variable
@@ -55,28 +55,28 @@ def sweep(record: Record, path: Path, table: str | None = None) -> None:
     texts = [name for name in ("status", "classification") if name in on_grid]
     names = [*texts, *(name for name in on_grid if name not in texts)]
     columns = [column for name in names for column in _columns(record, name, len(rows))]
-    given = [(axis, record.variables[name]) for axis, name in zip(axes, dims, strict=True)]
+    coordinates = [(axis, record.variables[name]) for axis, name in zip(axes, dims, strict=True)]
     if rows != dims:
         count = np.shape(record.variables[names[0]].values)[len(dims)]
-        given.append((_SECTION, Variable(np.arange(1, count + 1))))
-    points = np.meshgrid(*(np.asarray(item.values) for _, item in given), indexing="ij")
-    names = [_headed(axis, item.units) for axis, item in given]
+        coordinates.append((_SECTION, Variable(np.arange(1, count + 1))))
+    points = np.meshgrid(*(np.asarray(item.values) for _, item in coordinates), indexing="ij")
+    names = [_headed(axis, item.units) for axis, item in coordinates]
     _write(path, [*zip(names, (values.ravel() for values in points), strict=True), *columns])
 
 
-def table(record: Record, path: Path, table: str | None = None) -> tuple[str, ...]:
-    """Write the variables over one dimension: a row an entry, further dimensions as columns of their own.
+def table(record: ExportRecord, path: Path, table: str | None = None) -> tuple[str, ...]:
+    """Write the variables of one dimension: one row per entry; further dimensions become columns.
 
     Fields, which would be too many columns, are left out. Raises InputError for rows that a result does not have.
     """
-    known = _lengths(record.variables)
-    if table is not None and table not in known:
-        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(known)}")
-    dimension = table or next(name for name in (*_TABLES.get(record.kind, ()), *known) if name in known)
-    own = [name for name, item in record.variables.items() if item.dims[:1] == (dimension,)]
-    own.sort(key=lambda name: (name != dimension, not name.endswith("time")))  # coordinate and times come first
-    fields = [name for name in own if math.prod(np.shape(record.variables[name].values)[1:]) > _MOST_COLUMNS]
-    columns = [column for name in own if name not in fields for column in _columns(record, name, 1)]
+    lengths = _lengths(record.variables)
+    if table is not None and table not in lengths:
+        raise InputError(f"--table: no rows {table!r} in {record.file}; there are {', '.join(lengths)}")
+    dimension = table or next(name for name in (*_TABLES.get(record.kind, ()), *lengths) if name in lengths)
+    names = [name for name, item in record.variables.items() if item.dims[:1] == (dimension,)]
+    names.sort(key=lambda name: (name != dimension, not name.endswith("time")))  # coordinate and times come first
+    fields = [name for name in names if math.prod(np.shape(record.variables[name].values)[1:]) > _MOST_COLUMNS]
+    columns = [column for name in names if name not in fields for column in _columns(record, name, 1)]
     _write(path, columns)
     return tuple(f"left out: {name}, a field; .mat or .vtkhdf hold it" for name in fields)
 
@@ -89,29 +89,29 @@ def _lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
     return {item.dims[0]: len(item.values) for item in variables.values() if item.dims}
 
 
-def _columns(record: Record, name: str, leading: int) -> list[Column]:
-    """Return a variable's columns, over its leading dimensions as one: one for each place in the further ones."""
+def _columns(record: ExportRecord, name: str, leading: int) -> list[Column]:
+    """Return a variable's columns: rows are its leading dimensions, with a column per index of the others."""
     variable = record.variables[name]
     values = np.asarray(variable.values)
     rows, further = math.prod(values.shape[:leading]), values.shape[leading:]
     if not further:
         return [(_headed(name, variable.units), values.reshape(rows))]
-    places = list(np.ndindex(*further))
+    indices = list(np.ndindex(*further))
     units = variable.units.split(", ")
-    units = units if len(units) == len(places) else [variable.units] * len(places)
+    units = units if len(units) == len(indices) else [variable.units] * len(indices)
     labels = [
         ".".join(_label(record, dimension, index) for dimension, index in zip(variable.dims[leading:], at, strict=True))
-        for at in places
+        for at in indices
     ]
-    flat = values.reshape(rows, len(places))
+    flat = values.reshape(rows, len(indices))
     return [
-        (_headed(f"{name}.{label}", unit), flat[:, place])
-        for place, (label, unit) in enumerate(zip(labels, units, strict=True))
+        (_headed(f"{name}.{label}", unit), flat[:, column])
+        for column, (label, unit) in enumerate(zip(labels, units, strict=True))
     ]
 
 
-def _label(record: Record, dimension: str, index: int) -> str:
-    """Return the name of a place in a dimension, or its number from 1."""
+def _label(record: ExportRecord, dimension: str, index: int) -> str:
+    """Return the name of an index of a dimension, or its number from 1."""
     named = record.variables.get(dimension)
     if named is not None and np.asarray(named.values).dtype.kind in "UO":
         return str(named.values[index])

@@ -1,6 +1,6 @@
 """Universal files of test systems: modes on their mesh (datasets 2411, 2412, 55), curves and histories (58).
 
-SI units and the global frame, as datasets 164 says. Datasets 55 and 58 hold six digits of shapes, frequencies and steps
+SI units and the global frame (dataset 164). Datasets 55 and 58 hold six digits of shapes, frequencies and steps
 of time, twelve of curves: the curves of a reduced model are those at the frequencies that the file holds.
 """
 
@@ -30,7 +30,7 @@ from vanedamp.files.formats.universal_datasets import (
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.export.export import Option
 from vanedamp.studies.export.formats.vtkhdf import modes_of
-from vanedamp.studies.export.record import Record
+from vanedamp.studies.export.record import ExportRecord
 
 SUMMARY = "modes, receptances, curves and histories: Simcenter Testlab, MATLAB toolboxes, pyuff"
 ENDINGS = (".uff", ".unv")
@@ -50,13 +50,13 @@ _CURVES = {
 _MOST, _MOST_BYTES = 1_000_000, 8e9
 
 
-def modes(record: Record, path: Path) -> None:
+def modes(record: ExportRecord, path: Path) -> None:
     """Write nodes, cells by their corners, and the modes at all nodes, mass-normalised (modal mass 1).
 
     Of a rotating structure with gyroscopic coupling, the complex modes; of a ring, its waves on all sectors.
     """
-    found = modes_of(record)
-    points, cells = found.mesh.points, found.mesh.cells
+    mesh_modes = modes_of(record)
+    points, cells = mesh_modes.mesh.points, mesh_modes.mesh.cells
     labels = np.arange(1, len(points) + 1)
     zero = np.zeros(len(points), dtype=int)
     sets: list[Any] = [
@@ -71,13 +71,13 @@ def modes(record: Record, path: Path) -> None:
         sets.append({"type": 2412, solid[1]: list(_elements(cells[:, : solid[0]] + 1, solid[1]))})
     rigid = record.attributes.get("rigid") or {}  # of a file of an older version
     ratio = float(record.attributes.get("damping_ratio", rigid.get("damping_ratio", 0.0)))
-    for place, (name, frequency) in enumerate(found.rows):
-        given = (place + 1, frequency, ratio, labels, found.shape(place))
-        sets.append(mode_dataset(*given, name=name, quantity="displacement, kg^-0.5", mass=1.0))
+    for index, (name, frequency) in enumerate(mesh_modes.rows):
+        arguments = (index + 1, frequency, ratio, labels, mesh_modes.shape(index))
+        sets.append(mode_dataset(*arguments, name=name, quantity="displacement, kg^-0.5", mass=1.0))
     write_universal(sets, path)
 
 
-def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | None = None) -> tuple[str, ...]:
+def reduced_model(record: ExportRecord, path: Path, frequencies: Sequence[float] | None = None) -> tuple[str, ...]:
     """Write the receptances between all interface coordinates, m/N, at evenly spaced frequencies.
 
     frequencies: first and last (Hz) and their number; left out: 1000 up to the estimate's highest frequency, or 1.5
@@ -106,15 +106,15 @@ def reduced_model(record: Record, path: Path, frequencies: Sequence[float] | Non
         for (i, response), (j, force) in pairs
     )  # fmt: skip
     write_universal([*_headers(record), *curves], path)
-    told = []
+    warnings = []
     if model.arms is not None and np.any(model.arms > 0.0):
-        told.append("receptances: coordinates that are rotations have rad and N m in place of m and N")
+        warnings.append("receptances: coordinates that are rotations have rad and N m in place of m and N")
     if model.centrifugal_stiffness is not None:
-        told.append("receptances: of a model that rotates, those at standstill")
-    return tuple(told)
+        warnings.append("receptances: of a model that rotates, those at standstill")
+    return tuple(warnings)
 
 
-def sweep(record: Record, path: Path) -> tuple[str, ...]:
+def sweep(record: ExportRecord, path: Path) -> tuple[str, ...]:
     """Write the amplitude curves of a sweep over its frequencies, m, upwards, one for each of its other points.
 
     Points without a value are left out, since the format has no mark for them; nor has it one for a status. Raises
@@ -126,30 +126,30 @@ def sweep(record: Record, path: Path) -> tuple[str, ...]:
         raise InputError(f"{record.file}: is no sweep over {swept}; a .csv or a .mat holds it")
     upwards = np.argsort(record.values(_dimension(swept)))
     x = record.values(_dimension(swept))[upwards]
-    others = [axis for axis in axes if axis != swept]
-    given = {axis: record.values(_dimension(axis)) for axis in others}
-    kept = {name: record.values(name) for name in _CURVES if name in record.variables}
-    curves = {name: np.moveaxis(value, axes.index(swept), -1)[..., upwards] for name, value in kept.items()}
+    other_axes = [axis for axis in axes if axis != swept]
+    settings = {axis: record.values(_dimension(axis)) for axis in other_axes}
+    quantities = {name: record.values(name) for name in _CURVES if name in record.variables}
+    curves = {name: np.moveaxis(value, axes.index(swept), -1)[..., upwards] for name, value in quantities.items()}
 
     def sets() -> Iterator[dict[str, Any]]:
         yield from _headers(record)
-        for place in np.ndindex(*(len(values) for values in given.values())):
-            at = ", ".join(f"{axis} = {given[axis][index]}" for axis, index in zip(others, place, strict=True))
+        for point in np.ndindex(*(len(values) for values in settings.values())):
+            at = ", ".join(f"{axis} = {settings[axis][index]}" for axis, index in zip(other_axes, point, strict=True))
             lines = textwrap.wrap(_ascii(at), 80)
             names: dict[str, Any] = dict(zip(("id2", "id3", "id4", "id5"), lines, strict=False))
             for name, values in curves.items():
-                curve = values[place]
-                known = np.isfinite(curve)
-                if np.count_nonzero(known) > 1:
-                    yield _curve(_CURVES[name], x[known], curve[known], GENERAL, FREQUENCY, **names)
+                curve = values[point]
+                finite = np.isfinite(curve)
+                if np.count_nonzero(finite) > 1:
+                    yield _curve(_CURVES[name], x[finite], curve[finite], GENERAL, FREQUENCY, **names)
 
     write_universal(sets(), path)
     lost = sum(int(np.count_nonzero(~np.isfinite(curve))) for curve in curves.values())
-    told = [f"left out: {lost} points of curves without a figure"] if lost else []
-    return (*told, *_troubles(record.values("status").ravel().tolist(), "points"))
+    warnings = [f"left out: {lost} points of curves without a figure"] if lost else []
+    return (*warnings, *_troubles(record.values("status").ravel().tolist(), "points"))
 
 
-def response(record: Record, path: Path) -> tuple[str, ...]:
+def response(record: ExportRecord, path: Path) -> tuple[str, ...]:
     """Write the samples of a run: displacements of the response and of the bodies in their cavities, m, over time.
 
     Raises InputError for a response without samples.
@@ -176,7 +176,7 @@ def _troubles(statuses: list[str], what: str) -> tuple[str, ...]:
 WRITERS = {"modes": modes, "ring-modes": modes, "reduced-model": reduced_model, "sweep": sweep, "response": response}
 
 
-def _headers(record: Record) -> list[dict[str, Any]]:
+def _headers(record: ExportRecord) -> list[dict[str, Any]]:
     """Return the datasets 151 (where the file comes from) and 164 (SI units)."""
     from importlib.metadata import version
 
@@ -212,14 +212,14 @@ def _curve(
     return curve_dataset(_ascii(title), x, values, function, abscissa, DISPLACEMENT, per, **spacing, **more)
 
 
-def _range(given: Sequence[float] | None, top: float) -> tuple[float, float, int]:
-    """Return the first frequency, the step and the number of frequencies that a file holds exactly."""
-    if given is None:
+def _range(frequencies: Sequence[float] | None, top: float) -> tuple[float, float, int]:
+    """Return first frequency, step and number of frequencies, rounded to values that the file holds exactly."""
+    if frequencies is None:
         step = _rounded(top / 1000.0, 2)
         return step, step, 1000
-    if len(given) != 3:
-        raise InputError(f"--frequencies: expected START STOP NUM, not {len(given)} numbers")
-    start, stop, number = given
+    if len(frequencies) != 3:
+        raise InputError(f"--frequencies: expected START STOP NUM, not {len(frequencies)} numbers")
+    start, stop, number = frequencies
     if not (0.0 <= start < stop < np.inf and number >= 2 and number == int(number)):
         raise InputError(
             "--frequencies: expected 0 <= START < STOP and a whole NUM of at least 2, not "
@@ -228,7 +228,7 @@ def _range(given: Sequence[float] | None, top: float) -> tuple[float, float, int
     return _rounded(start), _rounded((stop - start) / (number - 1)), int(number)
 
 
-def _top(record: Record, frequencies: np.ndarray, rigid: int) -> float:
+def _top(record: ExportRecord, frequencies: np.ndarray, rigid: int) -> float:
     """Return the highest frequency that a model is for, Hz."""
     provenance: Mapping[str, Any] = record.attributes.get("provenance") or {}
     estimate = provenance.get("estimate") or {}
@@ -245,7 +245,7 @@ def _direction(direction: np.ndarray) -> int:
 
 
 def _rounded(value: float, digits: int = 5) -> float:
-    """Return a number in the digits that the file has behind the point."""
+    """Return a number rounded to the decimals of the file."""
     return float(f"{value:.{digits}e}")
 
 
@@ -258,5 +258,5 @@ def _short(name: str) -> str:
 
 
 def _ascii(text: str) -> str:
-    """Return a text in the letters that the format has."""
+    """Return a text in the characters of the format."""
     return text.encode("ascii", "replace").decode()

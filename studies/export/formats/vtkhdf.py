@@ -1,4 +1,4 @@
-"""VTKHDF, the file format of VTK for fields on meshes that move: modes, a mode over its phase, responses over time.
+"""VTKHDF, the file format of VTK for fields on moving meshes: modes, an animated mode, responses versus time.
 
 Written after VTK's specification (VTKHDF 2.0, UnstructuredGrid with Steps), which meshio does not write: mesh and cells
 once, fields per step.
@@ -22,7 +22,7 @@ from vanedamp.files.toml_input import InputError, validate
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.export.export import INPUT, Option
-from vanedamp.studies.export.record import Record, read_record
+from vanedamp.studies.export.record import ExportRecord, read_record
 from vanedamp.studies.ring_mesh import whole_ring, with_parts
 
 SUMMARY = "modes and animated responses on the mesh: ParaView, PyVista"
@@ -37,7 +37,7 @@ OPTIONS = (
 )
 #: bytes of the fields of a file
 _MOST_BYTES = 8e9
-#: by which displacements from the coordinates may differ from the samples of the run, of their largest
+#: tolerance of displacements from the coordinates against samples of the run, relative to the largest
 _SAME = 1e-6
 
 
@@ -49,33 +49,35 @@ class Mesh(NamedTuple):
     cell_type: int
 
 
-def modes(record: Record, path: Path, mode: int | None = None, frames: int | None = None) -> None:
-    """Write a field a mode, kg^-0.5; or one mode, `displacement` over `frames` steps of its cycle.
+def modes(record: ExportRecord, path: Path, mode: int | None = None, frames: int | None = None) -> None:
+    """Write one field per mode, kg^-0.5; or one mode, `displacement` over `frames` steps of its cycle.
 
     Complex modes, of a rotating structure with gyroscopic coupling and the waves of a ring, on all of its sectors: real
-    and imaginary parts as fields, or animated as Re(shape exp(i phase)). Raises InputError for a mode that is not there
+    and imaginary parts as fields, or animated as Re(shape exp(i phase)). Raises InputError for a mode out of range
     and too few frames.
     """
-    found = modes_of(record)
+    mesh_modes = modes_of(record)
     if mode is None:
         if frames is not None:
             raise InputError("--frames: is for one mode; name it by --mode")
-        _check_size(len(found.names), len(found.mesh.points), "take one by --mode")
-        named = ((f"{name}: {hz:.6g} Hz", found.shape(k)) for k, (name, hz) in enumerate(found.rows))
-        _write(path, found.mesh, with_parts(named))
+        _check_size(len(mesh_modes.names), len(mesh_modes.mesh.points), "take one by --mode")
+        named = ((f"{name}: {hz:.6g} Hz", mesh_modes.shape(k)) for k, (name, hz) in enumerate(mesh_modes.rows))
+        _write(path, mesh_modes.mesh, with_parts(named))
         return
-    if not 1 <= mode <= len(found.names):
-        raise InputError(f"--mode: expected 1 to {len(found.names)}, not {mode}")
+    if not 1 <= mode <= len(mesh_modes.names):
+        raise InputError(f"--mode: expected 1 to {len(mesh_modes.names)}, not {mode}")
     steps = 24 if frames is None else frames
     if steps < 2:
         raise InputError(f"--frames: expected at least 2, not {steps}")
-    mesh, frequency, shape = found.mesh, found.frequencies_hz[mode - 1], found.shape(mode - 1)
+    mesh, frequency, shape = mesh_modes.mesh, mesh_modes.frequencies_hz[mode - 1], mesh_modes.shape(mode - 1)
     phases = 2.0 * np.pi * np.arange(steps) / steps
     times = phases / (2.0 * np.pi * frequency) if frequency > 0.0 else phases
     _write_steps(path, mesh, times, ((shape * np.exp(1j * phase)).real for phase in phases))
 
 
-def response(record: Record, path: Path, mesh: str | Path | None = None, periods: int | None = None) -> tuple[str, ...]:
+def response(
+    record: ExportRecord, path: Path, mesh: str | Path | None = None, periods: int | None = None
+) -> tuple[str, ...]:
     """Write the displacements of a reduced model, m, relative to the base, at the samples of the last periods.
 
     Raises InputError for a response without samples of a reduced model's coordinates, a model without its recovery, or
@@ -107,17 +109,17 @@ def response(record: Record, path: Path, mesh: str | Path | None = None, periods
     if model.recovery is None or model.coordinates is None:
         raise InputError(f"{structure.file}: holds no basis to recover displacements; run `vanedamp reduce --recovery`")
     coordinates, shapes = record.values("coordinates"), model.natural[1]
-    seen = record.values("displacement")
+    displacement = record.values("displacement")
     if coordinates.shape[1] != len(shapes) or _differ(
-        coordinates @ (model.row(str(scene.excitation.at)) @ shapes), seen
+        coordinates @ (model.row(str(scene.excitation.at)) @ shapes), displacement
     ):
         raise InputError(f"{structure.file}: is not the reduced model of the run any more; run the scene again")
     on = _mesh(read_record(mesh))
     if on.points.shape != model.coordinates.shape or _differ(on.points, np.asarray(model.coordinates)):
         raise InputError(f"--mesh {mesh}: is not the mesh of {structure.file}; take the modes of the same case")
     time = record.values("time")
-    each = round(1.0 / (record.attributes["frequency"] * (time[1] - time[0]))) if len(time) > 1 else 1
-    shown = range(max(len(time) - last * each, 0), len(time))
+    per_period = round(1.0 / (record.attributes["frequency"] * (time[1] - time[0]))) if len(time) > 1 else 1
+    shown = range(max(len(time) - last * per_period, 0), len(time))
     basis = model.recovery @ shapes
     _write_steps(path, on, time[shown], ((basis @ coordinates[step]).reshape(-1, 3) for step in shown))
     residual = model.residual_flexibility is not None
@@ -128,7 +130,7 @@ WRITERS = {"modes": modes, "ring-modes": modes, "response": response}
 
 
 class ModesOnMesh(NamedTuple):
-    """The modes of a record: their mesh, frequencies (m,), names, and a function of a mode's place: shape (n, 3).
+    """The modes of a record: mesh, frequencies (m,), names, and the function that returns the shape (n, 3) by index.
 
     The shapes are complex where the record has those with the gyroscopic coupling, and of waves of a ring.
     """
@@ -144,7 +146,7 @@ class ModesOnMesh(NamedTuple):
         return zip(self.names, self.frequencies_hz.tolist(), strict=True)
 
 
-def modes_of(record: Record) -> ModesOnMesh:
+def modes_of(record: ExportRecord) -> ModesOnMesh:
     """Return the modes in a record of `vanedamp modal`, or of `vanedamp ring` on the whole ring. Raises InputError."""
     mesh = _mesh(record)
     if record.kind == "ring-modes":
@@ -154,7 +156,7 @@ def modes_of(record: Record) -> ModesOnMesh:
         on = Mesh(ring.points, ring.cells, mesh.cell_type)
         return ModesOnMesh(on, waves.frequencies_hz, names, lambda mode: ring.shape(waves, mode))
     if "gyroscopic_frequency" in record.variables:
-        real, imaginary = (record.values(f"gyroscopic_shape_{part}") for part in ("real", "imaginary"))
+        real, imaginary = (record.values(f"gyroscopic_shape_{component}") for component in ("real", "imaginary"))
         frequencies, shapes, word = record.values("gyroscopic_frequency"), real + 1j * imaginary, "gyroscopic mode"
     else:
         frequencies, shapes, word = record.values("frequency"), record.values("shape"), "mode"
@@ -163,17 +165,17 @@ def modes_of(record: Record) -> ModesOnMesh:
 
 
 def _chosen(structure: Any, estimate: Mapping[str, Any] | None) -> Any:
-    """Return the structure with the number of modes that the run chose, if it was open."""
+    """Return the structure with the number of modes that the run has chosen for `modes = "auto"`."""
     if structure.modes != "auto" or estimate is None:
         return structure
     return replace(structure, modes=int(estimate["modes"]), natural=True, attached=bool(estimate["attached"]))
 
 
-def _differ(values: np.ndarray, others: np.ndarray) -> bool:
-    return bool(np.abs(values - others).max(initial=0.0) > _SAME * np.abs(others).max(initial=0.0))
+def _differ(values: np.ndarray, reference: np.ndarray) -> bool:
+    return bool(np.abs(values - reference).max(initial=0.0) > _SAME * np.abs(reference).max(initial=0.0))
 
 
-def _mesh(record: Record) -> Mesh:
+def _mesh(record: ExportRecord) -> Mesh:
     missing = [name for name in ("coordinates", "cell") if name not in record.variables]
     if record.kind not in ("modes", "ring-modes") or missing or "vtk_cell_type" not in record.attributes:
         raise InputError(f"{record.file}: holds no modes with their mesh; `vanedamp modal CASE.toml -o` writes them")
@@ -219,7 +221,7 @@ def _check_size(fields: int, nodes: int, remedy: str) -> None:
 
 @contextmanager
 def _file(path: Path, mesh: Mesh) -> Iterator[Any]:
-    """Give the group of a new file that has the mesh as one part; the file is written at the end."""
+    """Yield the group of a new file with the mesh as one part; the file is written at the end."""
     image = io.BytesIO()  # a write that fails within HDF5 ends the whole process
     with h5py.File(image, "w") as file:
         root = file.create_group("VTKHDF")

@@ -15,14 +15,14 @@ RECORD = "vanedamp.studies.case.calibration_record.CalibrationRecord"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
-    found = CalibrationRecord.load(record.path)
-    yield Fact("rigid", asdict(found.rigid), "", "rigid model, SI units")
-    if found.part:
-        yield Fact("factor", dict(zip(found.part, found.factor.tolist(), strict=True)), "", "on stiffness")
-        yield Fact("target_frequency", found.target_hz.tolist(), "Hz")
-        yield Fact("frequency_after", found.after_hz.tolist(), "Hz")
-    yield Fact("damping", found.damping)
-    yield from level_fact(found.excitation)
-    if found.excitation:
-        yield Fact("force", found.excitation["force"], "N", "at resonance, gives this amplitude")
+    """Yield its main results."""
+    calibration = CalibrationRecord.load(record.path)
+    yield Fact("rigid", asdict(calibration.rigid), "", "rigid model, SI units")
+    if calibration.part:
+        yield Fact("factor", dict(zip(calibration.part, calibration.factor.tolist(), strict=True)), "", "on stiffness")
+        yield Fact("target_frequency", calibration.target_hz.tolist(), "Hz")
+        yield Fact("frequency_after", calibration.after_hz.tolist(), "Hz")
+    yield Fact("damping", calibration.damping)
+    yield from level_fact(calibration.excitation)
+    if calibration.excitation:
+        yield Fact("force", calibration.excitation["force"], "N", "at resonance, gives this amplitude")

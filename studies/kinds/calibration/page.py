@@ -105,15 +105,15 @@ def response_figure(record: CalibrationRecord) -> go.Figure:
     """Draw magnitude and phase of a measured response and of its fit, with the band and the mode."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06, row_heights=[0.62, 0.38])
     line, labels, damping, unit = record.line, record.label, record.damping, record.unit
-    for place, label in enumerate(labels[:_MOST]):
+    for index, label in enumerate(labels[:_MOST]):
         shown = "" if len(labels) == 1 else f" {label}"
         for values, of, look in (
             (record.response, "measured", {"mode": "markers", "marker": {"size": 4, "color": _MEASURED}}),
             (record.fitted, "fitted", {"mode": "lines", "line": {"color": _AFTER, "width": 2.2}}),
         ):
             name = f"{of}{shown}"
-            group = {"name": name, "legendgroup": name, "opacity": 1.0 - 0.2 * place}
-            magnitude, phase = np.abs(values[place]), np.degrees(np.angle(values[place]))
+            group = {"name": name, "legendgroup": name, "opacity": 1.0 - 0.2 * index}
+            magnitude, phase = np.abs(values[index]), np.degrees(np.angle(values[index]))
             figure.add_scatter(
                 x=line, y=magnitude, row=1, col=1, **group, **look,
                 hovertemplate=f"{name}<br>%{{x:.6g}} Hz<br>%{{y:.4g}} {unit}<extra></extra>",
@@ -138,6 +138,6 @@ def _response_table(record: CalibrationRecord) -> Table:
     header, columns = ["frequency, Hz"], [record.line]
     for label, measured, fitted in zip(record.label, record.response, record.fitted, strict=True):
         for name, values in (("measured", measured), ("fitted", fitted)):
-            header += [f"{label} {name} {part}, {record.unit}" for part in ("real", "imaginary")]
+            header += [f"{label} {name} {component}, {record.unit}" for component in ("real", "imaginary")]
             columns += [values.real, values.imag]
     return header, np.column_stack(columns).tolist()

@@ -15,7 +15,7 @@ RECORD = "vanedamp.Campbell"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     of = {name: variable.values for name, variable in record.variables.items()}
     rpm = of["speed"] * 30 / np.pi
     yield Fact("rpm", [float(rpm[0]), float(rpm[-1])], "", "lowest and highest speed")
@@ -23,7 +23,7 @@ def facts(record: Found) -> Iterator[Fact]:
         of["mode"], of["frequency"], strict=True)]  # fmt: skip
     yield Fact("frequencies", ends, "Hz")
     crossings = zip(of["crossing_mode"], of["crossing_order"], of["crossing_speed"] * 30 / np.pi, strict=True)
-    found = [f"mode {mode + 1} and order {order:g} at {speed:.6g} rpm" for mode, order, speed in crossings]
-    yield Fact("crossings", found)
+    texts = [f"mode {mode + 1} and order {order:g} at {speed:.6g} rpm" for mode, order, speed in crossings]
+    yield Fact("crossings", texts)
     yield Fact("veerings", int((of["approach_kind"] == "veering").sum()))
     yield Fact("error", float(of["error"].max()), "", "estimated, relative, of the frequencies")

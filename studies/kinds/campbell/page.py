@@ -14,7 +14,7 @@ from vanedamp.studies.report.page import Page
 
 ORDER = 40
 _ORDER, _MARK = "#64748b", "#111827"
-#: of modes beyond the colours
+#: of modes when all colours are used
 _DASHES = ("solid", "dot", "dashdot")
 
 
@@ -22,20 +22,22 @@ def shown(file: str, diagram: Campbell, page: Page) -> dict[str, Any]:
     """Return chart and tables of a diagram."""
     chart = page.chart("campbell", figure(diagram), *campbell_table(diagram), [file])
     solved = ", ".join(f"{speed * RPM:.6g}" for speed in diagram.solved)
-    margins = [diagram.operating and format_margin(each.margin(diagram.operating)) for each in diagram.crossings]
+    margins = [
+        diagram.operating and format_margin(crossing.margin(diagram.operating)) for crossing in diagram.crossings
+    ]
     return {"file": file, "chart": chart, "record": diagram, "solved": solved, "margins": margins}
 
 
 def figure(diagram: Campbell) -> go.Figure:
-    """Draw the modes as they are followed over the speed, engine-order lines, crossings and veerings."""
+    """Draw the modes versus speed, engine-order lines, crossings and veerings."""
     figure = go.Figure()
     top = 1.06 * float(np.nanmax(diagram.frequencies_hz))
     _add_orders(figure, diagram, top)
-    for place, (mode, frequencies) in enumerate(zip(diagram.modes, diagram.frequencies_hz, strict=True)):
+    for number, (mode, frequencies) in enumerate(zip(diagram.modes, diagram.frequencies_hz, strict=True)):
         name = diagram.label(mode)
         figure.add_scatter(
             x=diagram.rpm, y=frequencies, name=name, mode="lines", customdata=diagram.speeds,
-            line={"color": COLOURS[place % len(COLOURS)], "width": 2.2, "dash": _DASHES[place // len(COLOURS) % 3]},
+            line={"color": COLOURS[number % len(COLOURS)], "width": 2.2, "dash": _DASHES[number // len(COLOURS) % 3]},
             hovertemplate=f"{name}<br>%{{x:.1f}} rpm (%{{customdata:.2f}} rad/s)<br>%{{y:.3f}} Hz<extra></extra>",
         )  # fmt: skip
     _add_veerings(figure, diagram)
@@ -57,11 +59,11 @@ def _add_orders(figure: go.Figure, diagram: Campbell, top: float) -> None:
     """Add the lines of the engine orders, each with its label where it leaves the chart."""
     low, high = diagram.rpm[[0, -1]]
     drawn = [order for order in diagram.orders if order * low / 60.0 < top]
-    for place, order in enumerate(drawn):
+    for index, order in enumerate(drawn):
         end = min(high, 60.0 * top / order)
         figure.add_scatter(
             x=[low, end], y=[order * low / 60.0, order * end / 60.0], mode="lines", name="engine orders",
-            legendgroup="engine orders", showlegend=place == 0, hoverinfo="skip",
+            legendgroup="engine orders", showlegend=index == 0, hoverinfo="skip",
             line={"color": _ORDER, "width": 1.1, "dash": "dash"},
         )  # fmt: skip
         figure.add_annotation(
@@ -101,6 +103,6 @@ def _add_veerings(figure: go.Figure, diagram: Campbell) -> None:
 
 
 def campbell_table(diagram: Campbell) -> Table:
-    """Return the frequencies of the modes, a row per speed."""
+    """Return the frequencies of the modes, one row per speed."""
     header = ["speed, rad/s", "speed, rpm", *(f"{diagram.label(mode)}, Hz" for mode in diagram.modes)]
     return header, np.column_stack([diagram.speeds, diagram.rpm, diagram.frequencies_hz.T]).tolist()

@@ -33,12 +33,12 @@ def draw_campbell(axes: Axes, diagram: Campbell) -> None:
             continue
         axes.plot([low, end], [order * low / 60.0, order * end / 60.0], "--", color=_ORDER, linewidth=0.9)
         right: dict[str, Any] = {"xytext": (4, 0), "va": "center"}
-        beside = right if end == high else {"xytext": (5, -3), "va": "top"}
+        shift = right if end == high else {"xytext": (5, -3), "va": "top"}
         axes.annotate(
-            f"EO {order:g}", (end, order * end / 60.0), textcoords="offset points", color=_ORDER, fontsize=9, **beside
+            f"EO {order:g}", (end, order * end / 60.0), textcoords="offset points", color=_ORDER, fontsize=9, **shift
         )
-    for place, (mode, frequencies) in enumerate(zip(diagram.modes, diagram.frequencies_hz, strict=True)):
-        colour = COLOURS[place % len(COLOURS)]
+    for number, (mode, frequencies) in enumerate(zip(diagram.modes, diagram.frequencies_hz, strict=True)):
+        colour = COLOURS[number % len(COLOURS)]
         axes.plot(diagram.rpm, frequencies, color=colour, linewidth=1.8, label=diagram.label(mode))
     veerings, crossings = diagram.veerings, diagram.crossings
     if veerings:

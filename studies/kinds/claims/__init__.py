@@ -1,1 +1,1 @@
-"""Claims of a study and what became of them: a page for the report only."""
+"""Claims of a study and their verdicts: a page for the report only."""

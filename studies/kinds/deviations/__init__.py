@@ -15,7 +15,7 @@ RECORD = "vanedamp.rom.ring.identification.Identified"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     deviation, error = (np.asarray(record.variables[name].values) for name in ("deviation", "error"))
     most = int(np.argmax(abs(deviation)))
     yield Fact("sectors", len(deviation))

@@ -17,11 +17,11 @@ RECORD = "vanedamp.Ensemble"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
-    found = Ensemble.load(record.path)
-    yield Fact("ranges", {path: list(ends) for path, ends in found.scene.ranges.items()})
-    yield Fact("samples", len(found.status))
-    yield Fact("status", dict(Counter(map(str, found.status.ravel()))), "", "points")
-    low = found.quantile["reduction"][0].ravel()
+    """Yield its main results."""
+    ensemble = Ensemble.load(record.path)
+    yield Fact("ranges", {path: list(ends) for path, ends in ensemble.scene.ranges.items()})
+    yield Fact("samples", len(ensemble.status))
+    yield Fact("status", dict(Counter(map(str, ensemble.status.ravel()))), "", "points")
+    low = ensemble.quantile["reduction"][0].ravel()
     worst = int(np.nanargmin(low)) if np.isfinite(low).any() else 0
-    yield Fact("response", list(found.sentences())[worst : worst + 1], "", "the curve with the lowest reduction")
+    yield Fact("response", list(ensemble.sentences())[worst : worst + 1], "", "the curve with the lowest reduction")

@@ -16,13 +16,13 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import resonance_axis
 from vanedamp.studies.report.charts import COLOURS, axis_title, dressed
 
-#: place of a curve: an index of each axis, of the one along which it runs all
+#: position of a curve in the grid: an index per axis, all along the curve's own axis
 Place = tuple[Any, ...]
 #: quantiles of both bands, and the look of each
 _BANDS = ((0, 4, "5 to 95 %", 0.18), (1, 3, "25 to 75 %", 0.3))
 _BLUE = "29, 79, 145"
 _WITHOUT = {"color": "#334155", "dash": "dot"}
-#: panels of indices side by side
+#: columns of panels of indices
 _COLUMNS = 2
 
 
@@ -34,9 +34,9 @@ def along(record: Ensemble) -> str | None:
 
 
 def places(record: Ensemble) -> list[Place]:
-    """Return the places of all curves, () of one frequency."""
-    own = along(record)
-    return list(itertools.product(*([slice(None)] if path == own else range(n) for path, n in _lengths(record))))
+    """Return the grid positions of all curves; () for a single frequency."""
+    axis = along(record)
+    return list(itertools.product(*([slice(None)] if path == axis else range(n) for path, n in _lengths(record))))
 
 
 def _lengths(record: Ensemble) -> list[tuple[str, int]]:
@@ -44,9 +44,9 @@ def _lengths(record: Ensemble) -> list[tuple[str, int]]:
 
 
 def title(record: Ensemble, place: Place) -> str:
-    """Return the values of the other axes of a curve."""
-    given = zip(record.axes.items(), place, strict=True)
-    return ", ".join(f"{path} = {values[one]}" for (path, values), one in given if not isinstance(one, slice))
+    """Return a title with the values of the other axes of a curve."""
+    pairs = zip(record.axes.items(), place, strict=True)
+    return ", ".join(f"{path} = {values[index]}" for (path, values), index in pairs if not isinstance(index, slice))
 
 
 def bands_figure(record: Ensemble, place: Place) -> go.Figure:
@@ -79,15 +79,15 @@ def bands_figure(record: Ensemble, place: Place) -> go.Figure:
 
 def indices_figure(record: Ensemble, place: Place) -> go.Figure:
     """Draw the indices of the results of a curve, the reduction first, with their 95 % confidence."""
-    place, names = tuple(one for one in place if not isinstance(one, slice)), bar_names(record)
+    place, names = tuple(index for index in place if not isinstance(index, slice)), bar_names(record)
     rows = math.ceil(len(names) / _COLUMNS)
     titles = [name.replace("_", " ") for name in names]
     figure = make_subplots(rows=rows, cols=_COLUMNS, subplot_titles=titles, shared_xaxes=True, shared_yaxes=True)
     for number, name in enumerate(names):
         row, col = number // _COLUMNS + 1, number % _COLUMNS + 1
         first, first_half, total, total_half = record.indices[name][(slice(None), slice(None), *place)]
-        parts = (("first order", first, first_half, COLOURS[4]), ("total", total, total_half, COLOURS[0]))
-        for label, values, half, colour in parts:
+        series = (("first order", first, first_half, COLOURS[4]), ("total", total, total_half, COLOURS[0]))
+        for label, values, half, colour in series:
             figure.add_bar(
                 x=list(record.numbers), y=values, name=label, legendgroup=label, showlegend=number == 0,
                 marker={"color": colour}, error_y={"array": half, "thickness": 1.2}, row=row, col=col,
@@ -100,12 +100,12 @@ def indices_figure(record: Ensemble, place: Place) -> go.Figure:
 
 def bar_names(record: Ensemble) -> list[str]:
     """Return the results of a curve that have indices, the reduction first."""
-    of_curves = (name for name, one in spreads().items() if one.dims == ("curves",))
+    of_curves = (name for name, quantity in spreads().items() if quantity.dims == ("curves",))
     return sorted((name for name in of_curves if name in record.indices), key=lambda name: name != REDUCTION)
 
 
 def has_bars(record: Ensemble) -> bool:
-    """Whether each curve has a reduction of its own, in place of one at each of its points."""
+    """Whether a reduction belongs to each curve, not to each of its points."""
     return not record.axes or along(record) not in record.curves
 
 

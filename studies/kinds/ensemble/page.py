@@ -1,4 +1,4 @@
-"""Ensembles: curves with bands, quantiles of the reduction, and what its spread is due to."""
+"""Ensembles: curves with bands, quantiles of the reduction, and causes of its spread."""
 
 from __future__ import annotations
 
@@ -55,19 +55,19 @@ def _curve_rows(record: Ensemble, place: tuple[Any, ...]) -> Iterator[list[Any]]
     axis = along(record)
     assert axis is not None
     columns = [record.quantile[name][(slice(None), *place)] for name in _CURVES]
-    yield from np.column_stack([record.axes[axis], *(part.T for part in columns)]).tolist()
+    yield from np.column_stack([record.axes[axis], *(column.T for column in columns)]).tolist()
 
 
 def _index_rows(record: Ensemble, place: tuple[Any, ...]) -> Iterator[list[Any]]:
-    at = tuple(one for one in place if not isinstance(one, slice))
+    at = tuple(index for index in place if not isinstance(index, slice))
     for name in bar_names(record):
-        found = record.indices[name][(slice(None), slice(None), *at)].T.tolist()
-        yield from ([name, number, *values] for number, values in zip(record.numbers, found, strict=True))
+        indices = record.indices[name][(slice(None), slice(None), *at)].T.tolist()
+        yield from ([name, number, *values] for number, values in zip(record.numbers, indices, strict=True))
 
 
 def _quantile_rows(record: Ensemble) -> Iterator[tuple[str, str, list[float]]]:
     """Yield name, unit and quantiles of the results of a single curve, at one frequency of all results."""
-    units = {name: one.unit for name, one in spreads().items() if not record.axes or one.dims == ("curves",)}
+    units = {name: item.unit for name, item in spreads().items() if not record.axes or item.dims == ("curves",)}
     for name, unit in units.items():
         if name in record.quantile and record.quantile[name].ndim == 1:
             factor = 1e6 if unit == "m" else 1.0

@@ -13,7 +13,7 @@ RECORD = "vanedamp.Identification"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     attributes = record.attributes
     yield Fact("status", attributes["status"])
     yield Fact("answer", attributes["sentence"])

@@ -24,7 +24,7 @@ from vanedamp.studies.report.page import Page
 
 ORDER = 57
 figure = data_figure
-#: panels side by side, height of a row of them, and of what is around them
+#: columns of panels, height of a row of panels, and height around the panels
 _COLUMNS, _HEIGHT, _LEGEND = 3, 320, 120
 _DATA = "Measurements, and the model with its 95 % band; open circles are means of motions that do not repeat."
 _PROFILES = (
@@ -43,7 +43,7 @@ def shown(file: str, record: Identification, page: Page) -> dict[str, Any]:
 
 
 def _numbers(record: Identification) -> list[tuple[Any, ...]]:
-    """Return a row per number: path, unit, value, deviation, ends of the interval and whether they are bounds."""
+    """Return one row per number: path, unit, value, deviation, ends of the interval and whether they are bounds."""
     columns = (record.best, np.sqrt(record.covariance.diagonal()), record.interval, record.open)
     rows = zip(record.paths, *(column.tolist() for column in columns), strict=True)
     return [(path, unit_of(path), *rest) for path, *rest in rows]
@@ -52,25 +52,25 @@ def _numbers(record: Identification) -> list[tuple[Any, ...]]:
 def _charts(file: str, record: Identification, page: Page) -> Iterator[tuple[str, Chart]]:
     """Yield charts, each with a sentence."""
 
-    def made(kind: str, figure: go.Figure, panels: int, table: Table) -> Chart:
+    def draw(kind: str, figure: go.Figure, panels: int, table: Table) -> Chart:
         height = _LEGEND + _HEIGHT * math.ceil(panels / _COLUMNS)
         return page.chart(f"identification-{kind}", dressed(figure, height), *table, [file])
 
-    yield _DATA, made("data", data_figure(record), len(record.channels), _data_table(record))
+    yield _DATA, draw("data", data_figure(record), len(record.channels), _data_table(record))
     points = (record.profile_number, record.profile_value, record.profile_rise)
-    rows = [(record.paths[number], *rest) for number, *rest in zip(*(part.tolist() for part in points), strict=True)]
-    yield _PROFILES, made("profiles", profile_figure(record), len(record.paths), (("number", "value", "rise"), rows))
+    rows = [(record.paths[number], *rest) for number, *rest in zip(*(array.tolist() for array in points), strict=True)]
+    yield _PROFILES, draw("profiles", profile_figure(record), len(record.paths), (("number", "value", "rise"), rows))
     pairs = itertools.product(range(len(record.paths)), repeat=2)
     rows = [(record.paths[i], record.paths[j], record.correlation[i, j]) for i, j in pairs]
-    yield _CORRELATIONS, made("correlations", correlation_figure(record), 1, (("number", "other", "correlation"), rows))
+    yield _CORRELATIONS, draw("correlations", correlation_figure(record), 1, (("number", "other", "correlation"), rows))
     proposal = record.proposal
     if proposal is not None:
-        rows = [(*point, left) for point, left in zip(proposal.points, proposal.shrink[:, proposal.worst], strict=True)]
-        yield _NEXT, made("next", proposal_figure(record, proposal), 1, ((*proposal.axes, "left"), rows))
+        rows = [(*point, rest) for point, rest in zip(proposal.points, proposal.shrink[:, proposal.worst], strict=True)]
+        yield _NEXT, draw("next", proposal_figure(record, proposal), 1, ((*proposal.axes, "left"), rows))
 
 
 def _data_table(record: Identification) -> Table:
-    """Return measured values with those of the model."""
+    """Return measured and modelled values."""
     names = ("data_at", "data_value", "data_deviation", "data_model", "data_band")
     of = [f"{channel['measurement']} {channel['quantity']}" for channel in record.channels]
     columns = zip(*(getattr(record, name).tolist() for name in ("data_channel", *names)), strict=True)

@@ -13,7 +13,7 @@ RECORD = "vanedamp.LifeRecord"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     attributes, of = record.attributes, {name: variable.values for name, variable in record.variables.items()}
     yield Fact("answer", attributes["sentence"])
     yield Fact("hours", of["time"][[0, -1]].tolist(), "h", "first and last moment")

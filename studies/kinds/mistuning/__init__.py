@@ -14,7 +14,7 @@ RECORD = "vanedamp.MistuningStudy"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     study = MistuningStudy.load(record.path).to_json()
     yield Fact("draws", study["seeds"])
     for row in study["orders"]:

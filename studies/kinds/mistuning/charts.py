@@ -15,7 +15,7 @@ _FITTED = np.linspace(0.005, 0.995, 199)
 
 
 def amplification_figure(study: MistuningStudy) -> go.Figure:
-    """Draw the fraction of the draws that stay below an amplification by engine order, Weibull's fit and the bound."""
+    """Draw the fraction of draws below an amplification by engine order, Weibull's fit and the bound."""
     figure = go.Figure()
     fraction = (np.arange(len(study.seeds)) + 0.5) / len(study.seeds)
     for index, order in enumerate(study.orders.tolist()):
@@ -29,7 +29,7 @@ def amplification_figure(study: MistuningStudy) -> go.Figure:
         fit = study.fit(index)
         if fit is not None:
             figure.add_scatter(
-                x=[fit.quantile(each) for each in _FITTED], y=_FITTED, mode="lines", showlegend=False,
+                x=[fit.quantile(level) for level in _FITTED], y=_FITTED, mode="lines", showlegend=False,
                 line={"color": colour, "width": 1.3}, hoverinfo="skip", **look,
             )  # fmt: skip
     highest = float(study.amplification.max())
@@ -50,7 +50,7 @@ def amplification_table(study: MistuningStudy) -> Table:
 
 
 def sectors_figure(study: MistuningStudy, index: int) -> go.Figure:
-    """Draw the amplitudes of all sectors over the frequency for the first draw, over the largest of the tuned ring."""
+    """Draw the amplitudes of all sectors versus frequency for the first draw, relative to the tuned ring's maximum."""
     reference, x = float(study.tuned_amplitude[index]), study.frequencies_hz
     values = study.amplitude[index] / reference
     figure = go.Figure()
@@ -71,7 +71,7 @@ def sectors_figure(study: MistuningStudy, index: int) -> go.Figure:
 
 
 def sectors_table(study: MistuningStudy, index: int) -> Table:
-    """Return the amplitudes of the first draw, m/N, a row per frequency."""
+    """Return the amplitudes of the first draw, m/N, one row per frequency."""
     header = ["frequency, Hz", "tuned, m/N", *(f"sector {sector}, m/N" for sector in range(study.sectors))]
     return header, np.column_stack(
         [study.frequencies_hz, study.amplitude_tuned[index], study.amplitude[index]]

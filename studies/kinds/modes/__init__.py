@@ -13,7 +13,7 @@ RECORD = "vanedamp.Modes"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     attributes = record.attributes
     yield Fact("frequency_hz", record.variables["frequency"].values[:MOST].tolist(), "Hz", "natural frequencies")
     if "first_bending" in attributes:

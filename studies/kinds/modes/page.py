@@ -1,4 +1,4 @@
-"""Modes: shapes to turn, or a picture; frequencies, effective masses, rigid model."""
+"""Modes: interactive shapes, or a picture; frequencies, effective masses, rigid model."""
 
 from __future__ import annotations
 

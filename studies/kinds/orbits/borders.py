@@ -1,4 +1,4 @@
-"""Borders over two numbers, as lines over the colours of a sweep."""
+"""Borders in the plane of two parameters, drawn over the map of a sweep."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _LINES = {
 }  # fmt: skip
 #: symbols of named points, in the order of their names
 _SYMBOLS = ("circle", "square", "diamond", "triangle-up", "star", "pentagon", "triangle-down", "cross", "hexagon")
-#: named points without a mark of their own: the sequence of events changes, and the border goes on
+#: named points without a marker: the sequence of events changes, and the border continues
 _PLAIN = ("sequence",)
 
 
 def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
-    """Draw the borders of branches over their two numbers, over the map of a sweep (`map_of`) if there is one.
+    """Draw the borders of branches in the plane of their two parameters, over the map of a sweep (`map_of`), if any.
 
     Solid where stable orbits meet, dashed where all are unstable; named points are marked.
     """
@@ -45,13 +45,13 @@ def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
     shown = set[tuple[str, str]]()
     for number, border in enumerate(branches.borders):
         stable = border.stable_orbits.any(axis=1)
-        for own, what, dash in ((stable, "", "solid"), (~stable, ", unstable", "dash")):
-            if not own.any():
+        for mask, what, dash in ((stable, "", "solid"), (~stable, ", unstable", "dash")):
+            if not mask.any():
                 continue
-            kept = own | np.concatenate([[False], own[:-1]])
+            drawn = mask | np.concatenate([[False], mask[:-1]])
             name = border.kind + what
             figure.add_scatter(
-                x=np.where(kept, wide * border.parameter, np.nan), y=np.where(kept, high * border.second, np.nan),
+                x=np.where(drawn, wide * border.parameter, np.nan), y=np.where(drawn, high * border.second, np.nan),
                 mode="lines", name=name, legendgroup=name, showlegend=(border.kind, what) not in shown,
                 line={"color": _LINES[border.kind], "dash": dash, "width": 2.5}, customdata=_sides(border),
                 hovertemplate=f"border {number}, {border.kind}<br>%{{x:.10g}}, %{{y:.8g}}<br>%{{customdata}}"
@@ -67,18 +67,18 @@ def borders_figure(branches: Branches, map_: Panel | None = None) -> go.Figure:
 
 
 def _add_points(figure: go.Figure, branches: Branches, wide: float, high: float) -> None:
-    """Mark the named points, a symbol per kind."""
-    found: dict[str, list[tuple[BorderPoint, str]]] = {}
+    """Mark the named points, one symbol per kind."""
+    points_of_kind: dict[str, list[tuple[BorderPoint, str]]] = {}
     for number, border in enumerate(branches.borders):
         for point in border.special:
             if point.kind not in _PLAIN:
-                found.setdefault(point.kind, []).append((point, f"border {number}, {border.kind}"))
-    for place, (kind, points) in enumerate(sorted(found.items())):
+                points_of_kind.setdefault(point.kind, []).append((point, f"border {number}, {border.kind}"))
+    for rank, (kind, points) in enumerate(sorted(points_of_kind.items())):
         figure.add_scatter(
             x=[wide * point.parameter for point, _ in points], y=[high * point.second for point, _ in points],
             mode="markers", name=kind,
             marker={
-                "symbol": _SYMBOLS[place % len(_SYMBOLS)], "size": 11, "color": "#ffffff",
+                "symbol": _SYMBOLS[rank % len(_SYMBOLS)], "size": 11, "color": "#ffffff",
                 "line": {"color": "#000000", "width": 2},
             },
             customdata=[f"{name}: {kind} {point.note}" for point, name in points],
@@ -87,7 +87,7 @@ def _add_points(figure: go.Figure, branches: Branches, wide: float, high: float)
 
 
 def _sides(border: Border) -> list[str]:
-    """Return in words how many orbits meet at each point of a border."""
+    """Return the numbers of orbits on both sides of each point of a border, in words."""
     return [
         f"below {few} orbits, {fewer} stable; above {many} orbits, {more} stable"
         for (few, many), (fewer, more) in zip(border.orbits.tolist(), border.stable_orbits.tolist(), strict=True)
@@ -97,11 +97,11 @@ def _sides(border: Border) -> list[str]:
 def map_of(branches: Branches, sweep: Sweep) -> Panel | None:
     """Return the relative mean amplitudes of a sweep over the two numbers of the borders of its scene; None without.
 
-    Its other axes must be starts, of which the first is taken.
+    Its other axes must be starts; the first start is used.
     """
     two, paths = (branches.parameter, branches.second), list(sweep.axes)
-    others = [path for path in paths if path not in two]
-    if not set(two) <= set(paths) or not all(is_start(path) for path in others):
+    other_paths = [path for path in paths if path not in two]
+    if not set(two) <= set(paths) or not all(is_start(path) for path in other_paths):
         return None
     if min(len(sweep.axes[path]) for path in two) < 2:
         return None
@@ -115,13 +115,13 @@ def map_of(branches: Branches, sweep: Sweep) -> Panel | None:
 
 def maps_of(branches: Branches, sweeps: Mapping[str, Sweep]) -> dict[str, Panel]:
     """Return the maps of `map_of` by the files of the sweeps that have one."""
-    found = {file: map_of(branches, sweep) for file, sweep in sweeps.items()}
-    return {file: panel for file, panel in found.items() if panel is not None}
+    maps = {file: map_of(branches, sweep) for file, sweep in sweeps.items()}
+    return {file: panel for file, panel in maps.items() if panel is not None}
 
 
 def borders_table(branches: Branches) -> Table:
-    """Return a row per point, borders counted from 0, in SI units."""
-    rows, names = [], [name for name in branches.scalars if all(name in each.quantities for each in branches.borders)]
+    """Return one row per point, borders counted from 0, in SI units."""
+    rows, names = [], [name for name in branches.scalars if all(name in curve.quantities for curve in branches.borders)]
     for number, border in enumerate(branches.borders):
         columns = np.column_stack([border.parameter, border.second, *(border.quantities[name] for name in names)])
         sides = np.hstack([border.orbits, border.stable_orbits]).tolist()

@@ -15,14 +15,14 @@ from vanedamp.studies.report.charts import COLOURS, DASHES, Table, dressed
 
 _STRUCTURE, _IMPACT = "#0f172a", "#d55e00"
 _ROW = 330  # pixels
-#: of panels side by side, over the width: room for ticks and a title on a page of 800 pixels
+#: distance of panels, relative to the width: space for ticks and a title on a page of 800 pixels
 _APART = 0.13
 #: periods that are drawn, and starts of periods
 _PERIODS, _MOST_STARTS = 25, 2000
 
 
 def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
-    """Draw a row an orbit, by its name: displacements over the time, and the phase planes."""
+    """Draw one row per orbit, by its name: displacements versus time, and the phase planes."""
     bodies = any(history.slip.shape[1] for history in histories.values())
     rows = len(histories)
     figure = make_subplots(
@@ -42,7 +42,7 @@ def orbits_figure(histories: Mapping[str, OrbitHistory]) -> go.Figure:
 
 
 def add_planes(figure: go.Figure, history: OrbitHistory, row: int, col: int) -> None:
-    """Draw the phase plane of the structure into a column of a row, and the bodies' into the next."""
+    """Draw the phase plane of the structure into a column of a row, and that of the bodies into the next."""
     states = (history.displacement, history.velocity, history.slip, history.slip_velocity)
     for column, curve in _curves(states):
         figure.add_scatter(
@@ -53,10 +53,10 @@ def add_planes(figure: go.Figure, history: OrbitHistory, row: int, col: int) -> 
     planes = [("structure", history.displacement)]
     if history.slip.shape[1]:
         planes.append(("in the cavity", history.slip))
-    for place, (what, values) in enumerate(planes, start=col):
+    for panel, (what, values) in enumerate(planes, start=col):
         reach = 1.06e6 * np.abs(values).max(initial=1e-12)  # bodies move from wall to wall: show the frame apart
-        figure.update_xaxes(title_text=f"{what}, µm", range=[-reach, reach], row=row, col=place)
-        figure.update_yaxes(title={"text": "mm/s", "font_size": 12, "standoff": 2}, row=row, col=place)
+        figure.update_xaxes(title_text=f"{what}, µm", range=[-reach, reach], row=row, col=panel)
+        figure.update_yaxes(title={"text": "mm/s", "font_size": 12, "standoff": 2}, row=row, col=panel)
 
 
 def add_starts(figure: go.Figure, states: Sequence[np.ndarray], name: str, row: int, col: int, size: int) -> None:
@@ -91,7 +91,7 @@ def _add_times(figure: go.Figure, history: OrbitHistory, row: int) -> None:
     figure.update_yaxes(title={"text": "displacement, µm", "font_size": 12, "standoff": 2}, row=row, col=1)
 
 
-class _Curve(NamedTuple):
+class _StateCurve(NamedTuple):
     """Name and look of a curve, its values (n,), m, and their rates (n,), m/s."""
 
     name: str
@@ -101,13 +101,13 @@ class _Curve(NamedTuple):
     rate: np.ndarray
 
 
-def _curves(states: Sequence[np.ndarray]) -> Iterator[tuple[int, _Curve]]:
+def _curves(states: Sequence[np.ndarray]) -> Iterator[tuple[int, _StateCurve]]:
     """Yield the plane, 0 or 1, and the curve of the structure and of each body; states: as of `add_starts`."""
     displacement, velocity, slip, slip_velocity = states
-    yield 0, _Curve("structure", _STRUCTURE, "solid", displacement, velocity)
+    yield 0, _StateCurve("structure", _STRUCTURE, "solid", displacement, velocity)
     for body, (values, rate) in enumerate(zip(slip.T, slip_velocity.T, strict=True)):
         colour, dash = COLOURS[body % len(COLOURS)], DASHES[body % len(DASHES)]
-        yield 1, _Curve(f"body {body + 1} in its cavity", colour, dash, values, rate)
+        yield 1, _StateCurve(f"body {body + 1} in its cavity", colour, dash, values, rate)
 
 
 def orbits_table(histories: Mapping[str, OrbitHistory]) -> Table:
@@ -124,7 +124,7 @@ def orbits_table(histories: Mapping[str, OrbitHistory]) -> Table:
 def phase_figure(response: Response) -> go.Figure:
     """Draw the phase planes of structure and bodies, with a point at the start of each of the evaluated periods.
 
-    A motion that repeats after k periods has k points, one that never does fills an area. response: with samples and
+    A motion that repeats after k periods has k points, a non-periodic one fills an area. response: with samples and
     events.
     """
     history = late_history(response, _PERIODS)
@@ -137,6 +137,6 @@ def phase_figure(response: Response) -> go.Figure:
     states = (response.section[late, 0], response.section[late, 1], response.slip[late], response.slip_velocity[late])
     add_starts(figure, states, "starts of periods", row=1, col=1, size=5)
     for col, values in enumerate(((history.displacement, states[0]), (history.slip, states[2]))[:columns], start=1):
-        reach = 1.06e6 * max(1e-12, *(np.abs(each).max(initial=0.0) for each in values))
+        reach = 1.06e6 * max(1e-12, *(np.abs(array).max(initial=0.0) for array in values))
         figure.update_xaxes(range=[-reach, reach], row=1, col=col)
     return dressed(figure, height=430).update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})

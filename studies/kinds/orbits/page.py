@@ -1,4 +1,4 @@
-"""Branches of periodic orbits: over their parameter and the sweeps' points, their multipliers, and orbits on them."""
+"""Branches of periodic orbits versus their parameter, with points of sweeps, Floquet multipliers and orbits."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ _SYMBOLS = {
     "grazing": "x-thin", "sequence": "cross-thin", "end": "line-ns",
 }  # fmt: skip
 _POINT = "#9ca3af"  # of a sweep
-#: modulus as which smaller ones are drawn
+#: smaller moduli are drawn at this value
 _SMALLEST = 1e-3
 
 
 def section(results: Mapping[str, Result], page: Page) -> list[dict[str, Any]]:
-    """Return charts, branches and special points of every scene and parameter, which may have several files."""
+    """Return charts, branches and special points for every scene and parameter; several files may belong to one."""
     groups: dict[str, dict[str, Branches]] = {}
     for file, result in results.items():
         record = result.record
@@ -63,7 +63,7 @@ def figure(record: Branches) -> go.Figure:
 def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
     branches, files = joined(list(records.values())), list(records)
     beside = sweeps_beside(branches.scene, branches.parameter, page.results.kinds["sweep"])
-    figure = branches_figure(branches, {page.names[other]: points for other, points in beside.items()})
+    figure = branches_figure(branches, {page.names[file]: points for file, points in beside.items()})
     shown: dict[str, Any] = {"record": branches, "units": unit_of(branches.parameter), "orbits": None}
     shown["quantities"] = _ranges(branches)
     shown["rows"] = [_row(branches, number) for number in range(len(branches.branches))]
@@ -99,25 +99,25 @@ def _row(branches: Branches, number: int) -> dict[str, Any]:
     special = [(point, amplitude_at(branches, branch, point)) for point in branch.special if point.kind in _LISTED]
     source = ""
     if branch.source is not None:
-        parent, place = branch.source
-        source = f"{branches.branches[parent].special[place].kind} on branch {parent}"
+        parent, index = branch.source
+        source = f"{branches.branches[parent].special[index].kind} on branch {parent}"
     return {"name": branch_name(number, branch), "branch": branch, "special": special, "source": source}
 
 
 def _ranges(branches: Branches) -> dict[str, list[str]]:
-    """Return the sentence and the range on every branch of each quantity that is one number, for people."""
-    found = {}
-    for name, one in branches.scalars.items():
-        ends = [(np.fmin.reduce(own), np.fmax.reduce(own)) for each in branches.branches
-                for own in [each.quantities.get(name, np.full(1, np.nan))]]  # fmt: skip
+    """Return the description and the range on every branch of each scalar quantity, as text."""
+    ranges = {}
+    for name, entry in branches.scalars.items():
+        ends = [(np.fmin.reduce(values), np.fmax.reduce(values)) for branch in branches.branches
+                for values in [branch.quantities.get(name, np.full(1, np.nan))]]  # fmt: skip
         if np.isfinite(ends).any():
-            words = [" to ".join(dict.fromkeys(quantity(float(end), one.unit) for end in each)) for each in ends]
-            found[name.replace("_", " ")] = [one.about, *words]
-    return found
+            words = [" to ".join(dict.fromkeys(quantity(float(end), entry.unit) for end in limits)) for limits in ends]
+            ranges[name.replace("_", " ")] = [entry.about, *words]
+    return ranges
 
 
 def _histories(branches: Branches) -> tuple[dict[str, OrbitHistory], str]:
-    """Return the motion along chosen orbits by their names, or why there is none: a reduced model may be elsewhere."""
+    """Return the motion along chosen orbits by their names, or the reason for none, such as a missing reduced model."""
     chosen = list(itertools.islice(_chosen(branches), _MOST_ORBITS))
     try:
         along = map_along(branches.scene)
@@ -129,12 +129,12 @@ def _histories(branches: Branches) -> tuple[dict[str, OrbitHistory], str]:
 def _chosen(branches: Branches) -> Iterator[tuple[str, int, float, np.ndarray]]:
     """Yield name, periods, parameter and state of the largest stable orbit of every branch, and of its bifurcations."""
     for number, branch in enumerate(branches.branches):
-        found = []
+        picks = []
         if branch.stable.any():
             largest = int(np.argmax(np.where(branch.stable, branch.amplitude_mean, -np.inf)))
-            found.append(("largest stable", float(branch.parameter[largest]), branch.state[largest]))
-        found += [(point.kind, point.parameter, point.state) for point in branch.special if point.kind in _BIFURCATIONS]
-        for kind, parameter, state in found:
+            picks.append(("largest stable", float(branch.parameter[largest]), branch.state[largest]))
+        picks += [(point.kind, point.parameter, point.state) for point in branch.special if point.kind in _BIFURCATIONS]
+        for kind, parameter, state in picks:
             value = quantity(parameter, unit_of(branches.parameter))
             yield f"{branch_name(number, branch)}, {kind}, {value}", branch.periods, parameter, state
 
@@ -154,18 +154,18 @@ def branches_figure(
     for number, branch in enumerate(branches.branches):
         name, look = branch_name(number, branch), {"color": _COLOURS[number % len(_COLOURS)]}
         unstable = ~(branch.stable | branch.undetermined)
-        for own, kind, dash, width in (
+        for mask, kind, dash, width in (
             (branch.stable, "stable", "solid", 2.2), (unstable, "unstable", "dash", 1.6),
             (branch.undetermined, "stability undetermined", "dot", 1.6),
         ):  # fmt: skip
-            kept = _drawn(own)
-            if not own.any():
+            drawn = _drawn(mask)
+            if not mask.any():
                 continue
-            x = np.where(kept, wide * branch.parameter, np.nan)
+            x = np.where(drawn, wide * branch.parameter, np.nan)
             below = [(2, named, values, "%{y:.6g}") for named, values in _below(branches, branch).items()]
             for row, named, values, shown in ((1, "", 1e6 * branch.amplitude_mean, "%{y:.6g} µm"), *below):
                 figure.add_scatter(
-                    x=x, y=np.where(kept, values, np.nan), mode="lines", meta=named or None,
+                    x=x, y=np.where(drawn, values, np.nan), mode="lines", meta=named or None,
                     visible=named in ("", *list(_shown(branches))[:1]),
                     name=f"{name}, {kind}", legendgroup=name, showlegend=row == 1, row=row, col=1,
                     line=look | {"dash": dash, "width": width},
@@ -180,13 +180,13 @@ def branches_figure(
 
 def _shown(branches: Branches) -> dict[str, str]:
     """Return the axis titles of quantities that the lower chart can show, by name; impacts first."""
-    known = {name: one for name, one in branches.scalars.items() if one.spread}
-    order = sorted(known, key=lambda name: known[name].family != "impacts")
-    return {name: axis_title(name, for_people(known[name].unit)[1]) for name in order}
+    spreads = {name: entry for name, entry in branches.scalars.items() if entry.spread}
+    order = sorted(spreads, key=lambda name: spreads[name].family != "impacts")
+    return {name: axis_title(name, for_people(spreads[name].unit)[1]) for name in order}
 
 
 def _below(branches: Branches, branch: Branch) -> dict[str, np.ndarray]:
-    """Return the values of those quantities of a branch, for people."""
+    """Return the values of these quantities on a branch, in displayed units."""
     return {
         name: for_people(branches.scalars[name].unit)[0] * branch.quantities[name]
         for name in _shown(branches) if name in branch.quantities
@@ -194,25 +194,25 @@ def _below(branches: Branches, branch: Branch) -> dict[str, np.ndarray]:
 
 
 def _add_menu(figure: go.Figure, branches: Branches) -> None:
-    """Let the lower chart show one of its quantities."""
-    shown, own = _shown(branches), [place for place, trace in enumerate(figure.data) if trace.meta]
+    """Add a menu for the quantity in the lower chart."""
+    shown, traces = _shown(branches), [index for index, trace in enumerate(figure.data) if trace.meta]
     figure.update_yaxes(title_text=next(iter(shown.values()), ""), row=2, col=1)
     buttons = [
         {
             "label": name.replace("_", " "), "method": "update",
             "args": [
-                {"visible": [figure.data[place].meta == name for place in own]}, {"yaxis2.title.text": title}, own
+                {"visible": [figure.data[index].meta == name for index in traces]}, {"yaxis2.title.text": title}, traces
             ],
         }
         for name, title in shown.items()
     ]  # fmt: skip
-    place = {"x": 0.0, "xanchor": "left", "y": 0.26, "yanchor": "bottom", "pad": {"b": 4}}
+    position = {"x": 0.0, "xanchor": "left", "y": 0.26, "yanchor": "bottom", "pad": {"b": 4}}
     if len(buttons) > 1:
-        figure.update_layout(updatemenus=[{"buttons": buttons} | place])
+        figure.update_layout(updatemenus=[{"buttons": buttons} | position])
 
 
 def joined(records: Sequence[Branches]) -> Branches:
-    """Return the branches of several files of one scene and parameter as one record, numbered through."""
+    """Return the branches of several files of one scene and parameter as one record, numbered consecutively."""
     branches: list[Branch] = []
     for record in records:
         first = len(branches)
@@ -225,12 +225,12 @@ def joined(records: Sequence[Branches]) -> Branches:
 
 def joined_borders(records: Sequence[Branches], second: str) -> tuple[Border, ...]:
     """Return the borders over a second number of several files, their branches numbered as in `joined`."""
-    found, first = list[Border](), 0
+    borders, first = list[Border](), 0
     for record in records:
         for border in record.borders if record.second == second else ():
-            found.append(replace(border, source=(border.source[0] + first, border.source[1])))
+            borders.append(replace(border, source=(border.source[0] + first, border.source[1])))
         first += len(record.branches)
-    return tuple(found)
+    return tuple(borders)
 
 
 def branch_name(number: int, branch: Branch) -> str:
@@ -238,9 +238,9 @@ def branch_name(number: int, branch: Branch) -> str:
     return f"branch {number}" if branch.periods == 1 else f"branch {number}, {branch.periods} periods"
 
 
-def _drawn(own: np.ndarray) -> np.ndarray:
-    """Return own points and those just after them: lines of one kind continue to the first point of the other."""
-    return own | np.concatenate([[False], own[:-1]])
+def _drawn(mask: np.ndarray) -> np.ndarray:
+    """Return the masked points and those just after them: a line continues to the first point of the next one."""
+    return mask | np.concatenate([[False], mask[:-1]])
 
 
 def amplitude_at(branches: Branches, branch: Branch, point: SpecialPoint) -> float:
@@ -253,24 +253,24 @@ def amplitude_at(branches: Branches, branch: Branch, point: SpecialPoint) -> flo
 
 def _add_special_points(figure: go.Figure, branches: Branches, wide: float) -> None:
     for kind, symbol in _SYMBOLS.items():
-        found = [
+        points = [
             (point, amplitude_at(branches, branch, point), f"{kind} on {branch_name(number, branch)}")
             for number, branch in enumerate(branches.branches)
             for point in branch.special
             if point.kind == kind
         ]
-        if found:
+        if points:
             figure.add_scatter(
-                x=[wide * point.parameter for point, _, _ in found], y=[1e6 * amplitude for _, amplitude, _ in found],
+                x=[wide * point.parameter for point, _, _ in points], y=[1e6 * amplitude for _, amplitude, _ in points],
                 name=kind, mode="markers", row=1, col=1, visible=True if kind != "sequence" else "legendonly",
-                customdata=[f"{name}: {point.note}".removesuffix(": ") for point, _, name in found],
+                customdata=[f"{name}: {point.note}".removesuffix(": ") for point, _, name in points],
                 marker={"symbol": symbol, "size": 11, "color": "#ffffff", "line": {"color": "#000000", "width": 2}},
                 hovertemplate="%{customdata}<br>%{x:.12g}: %{y:.6g} µm<extra></extra>",
             )  # fmt: skip
 
 
 def _branches_table(branches: Branches) -> Table:
-    """Return a row per point, branches counted from 0, in SI units."""
+    """Return one row per point, branches counted from 0, in SI units."""
     names = list(branches.scalars)
     rows = []
     for number, branch in enumerate(branches.branches):
@@ -287,7 +287,7 @@ def _branches_table(branches: Branches) -> Table:
 def _multipliers_figure(branches: Branches) -> go.Figure:
     """Draw the multipliers in the complex plane with the unit circle, and their moduli over the parameter.
 
-    Beyond the unit circle, the distance from it is the decimal logarithm of the modulus, so that all are seen.
+    Outside the unit circle, the distance from it is the decimal logarithm of the modulus, so that all are visible.
     """
     figure = make_subplots(rows=1, cols=2, column_widths=[0.46, 0.54], horizontal_spacing=0.14)
     wide, units = for_people(unit_of(branches.parameter))
@@ -337,12 +337,12 @@ def _multipliers_figure(branches: Branches) -> go.Figure:
 
 
 def _beyond(values: np.ndarray) -> float:
-    """Return the decades by which the largest multiplier lies beyond the unit circle."""
+    """Return the decades by which the largest multiplier lies outside the unit circle."""
     return float(np.log10(np.abs(values[np.isfinite(values)]).max(initial=1.0)))
 
 
 def _multipliers_table(branches: Branches) -> Table:
-    """Return a row per multiplier."""
+    """Return one row per multiplier."""
     return ["branch", branches.parameter, "real", "imaginary"], [
         [number, parameter, value.real, value.imag]
         for number, branch in enumerate(branches.branches)

@@ -16,14 +16,16 @@ RECORD = "vanedamp.Ramp"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     ramp = Ramp.load(record.path)
-    found = ramp.to_json()
+    data = ramp.to_json()
     yield Fact("runs", [
-        f"{abs(run['rate']):g} {found['unit']}/s {run['direction']}: {run['status']}, peak {run['peak']:.6g} m at "
+        f"{abs(run['rate']):g} {data['unit']}/s {run['direction']}: {run['status']}, peak {run['peak']:.6g} m at "
         f"{run['peak_frequency']:.6g} Hz, {run['peak_share']:.1%} of the steady peak without bodies"
-        for run in found["runs"]
+        for run in data["runs"]
     ])  # fmt: skip
-    known = {one.name: one for run in ramp.runs for one, _, _ in run.limits}
-    for name, one in known.items():
-        yield Fact(name, [float(run.largest.get(name, np.nan)) for run in ramp.runs], one.unit, f"{one.about}; at most")
+    limits = {item.name: item for run in ramp.runs for item, _, _ in run.limits}
+    for name, item in limits.items():
+        yield Fact(
+            name, [float(run.largest.get(name, np.nan)) for run in ramp.runs], item.unit, f"{item.about}; at most"
+        )

@@ -21,9 +21,9 @@ from vanedamp.studies.report.sweep_beside import sweeps_beside
 
 ORDER = 70
 _STATIONARY = "#0f172a"
-#: points of a curve that are drawn; of more periods, the largest of equally many each
+#: largest number of points per curve; longer runs are drawn by the maxima of equal groups of periods
 _MOST_POINTS = 2000
-#: rates of Lewis' curve, and how far it extends beyond the runs'
+#: number of rates of Lewis' curve, and factor by which it extends beyond the rates of the runs
 _RATES, _BEYOND = 61, 3.0
 _TITLES = {"frequency": "excitation frequency, Hz", "speed": "speed of rotation, rad/s"}
 
@@ -32,7 +32,7 @@ def shown(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
     """Return charts and peaks of the runs of a file."""
     sweeps = page.results.kinds["sweep"]
     beside = sweeps_beside(ramp.scene, ramp.table.path, sweeps, "amplitude_mean_dynamic")
-    named = {page.names[other]: points for other, points in beside.items()}
+    named = {page.names[path]: points for path, points in beside.items()}
     rows = [
         {"name": run_name(ramp, run), "run": run, "share": ramp.share(run), "at": run.at_peak("frequency")}
         for run in ramp.runs
@@ -53,7 +53,7 @@ def shown(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
 
 
 def _stress_chart(file: str, ramp: Ramp, page: Page) -> Chart | None:
-    """Return the stress of the runs over the frequency, or the speed; None without hot spots."""
+    """Return the stress of the runs versus frequency or speed; None without hot spots."""
     at = along(ramp)
     courses = {
         run_name(ramp, run): (getattr(run, at), run.stress) for run in ramp.runs
@@ -63,7 +63,7 @@ def _stress_chart(file: str, ramp: Ramp, page: Page) -> Chart | None:
 
 
 def along(ramp: Ramp) -> str:
-    """Return the series that runs are drawn over: "frequency", or "speed" where the frequency stays."""
+    """Return the horizontal axis of the charts: "frequency", or "speed" if the frequency is constant."""
     return "frequency" if any(np.ptp(run.frequency) > 0.0 for run in ramp.runs if len(run.time)) else "speed"
 
 
@@ -86,9 +86,9 @@ def figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = Map
                 line={"color": _STATIONARY, "dash": dash, "width": 1.6}, hovertemplate="%{x:.6g}: %{y:.5g} µm",
             )  # fmt: skip
     for run in ramp.runs:
-        kept = _thinned(run)
+        drawn = _thinned(run)
         figure.add_scatter(
-            x=getattr(run, x)[kept], y=1e6 * run.amplitude_dynamic[kept], name=run_name(ramp, run), mode="lines",
+            x=getattr(run, x)[drawn], y=1e6 * run.amplitude_dynamic[drawn], name=run_name(ramp, run), mode="lines",
             line={
                 "color": COLOURS[rates.index(abs(run.rate)) % len(COLOURS)], "width": 1.8,
                 "dash": "solid" if run.rate > 0.0 else "dash",
@@ -108,29 +108,29 @@ def figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = Map
 
 
 def menu(ramp: Ramp) -> go.Figure | None:
-    """Draw one quantity of the periods at a time, which a menu chooses; None for files of earlier versions."""
-    shown = [one for name in ramp.quantities if not (one := table()[name]).dims]
+    """Draw one quantity of the periods, chosen by a menu; None for files of earlier versions."""
+    shown = [quantity for name in ramp.quantities if not (quantity := table()[name]).dims]
     if not shown or not any(len(run.time) for run in ramp.runs):
         return None
     figure, x = go.Figure(), along(ramp)
-    for one in shown:
+    for quantity in shown:
         for number, run in enumerate(ramp.runs):
-            kept = _thinned(run)
-            values = run.quantities.get(one.name, np.full(len(run.time), np.nan))
+            drawn = _thinned(run)
+            values = run.quantities.get(quantity.name, np.full(len(run.time), np.nan))
             figure.add_scatter(
-                x=getattr(run, x)[kept], y=values[kept], name=run_name(ramp, run), mode="lines",
-                visible=one is shown[0], line={"color": COLOURS[number % len(COLOURS)], "width": 1.6},
+                x=getattr(run, x)[drawn], y=values[drawn], name=run_name(ramp, run), mode="lines",
+                visible=quantity is shown[0], line={"color": COLOURS[number % len(COLOURS)], "width": 1.6},
                 hovertemplate="%{x:.6g}: %{y:.5g}",
             )  # fmt: skip
     choices = [
         {
-            "label": one.name, "method": "update",
+            "label": quantity.name, "method": "update",
             "args": [
-                {"visible": [each is one for each in shown for _ in ramp.runs]},
-                {"yaxis.title.text": f"{one.name}, {one.unit}"},
+                {"visible": [candidate is quantity for candidate in shown for _ in ramp.runs]},
+                {"yaxis.title.text": f"{quantity.name}, {quantity.unit}"},
             ],
         }
-        for one in shown
+        for quantity in shown
     ]  # fmt: skip
     figure.update_layout(updatemenus=[{"buttons": choices, "x": 0.0, "xanchor": "left", "y": 1.2, "yanchor": "top"}])
     figure.update_xaxes(title_text=_TITLES[x], hoverformat=".6g")
@@ -143,9 +143,9 @@ def _measured_table(ramp: Ramp) -> Table:
     names = [name for name in ramp.quantities if not table()[name].dims]
     rows: list[list[float]] = []
     for run in ramp.runs:
-        nothing, kept = np.full(len(run.time), np.nan), _thinned(run)
+        nothing, drawn = np.full(len(run.time), np.nan), _thinned(run)
         columns = [run.time, *(run.quantities.get(name, nothing) for name in names)]
-        rows += ([run.rate, *values] for values in np.column_stack([c[kept] for c in columns]).tolist())
+        rows += ([run.rate, *values] for values in np.column_stack([c[drawn] for c in columns]).tolist())
     return ["rate", "time", *names], rows
 
 
@@ -163,14 +163,14 @@ def _ramp_table(ramp: Ramp) -> Table:
     stuck = [f"stuck_{body + 1}" for body in range(len(ramp.scene.damper))]
     rows: list[list[float]] = []
     for run in ramp.runs:
-        kept = _thinned(run)
+        drawn = _thinned(run)
         columns = (run.time, run.frequency, run.speed, run.amplitude_dynamic, run.impacts, *run.stuck.T.astype(float))
-        rows += ([run.rate, *values] for values in np.column_stack([c[kept] for c in columns]).tolist())
+        rows += ([run.rate, *values] for values in np.column_stack([c[drawn] for c in columns]).tolist())
     return ["rate", "time", "frequency", "speed", "amplitude", "impacts", *stuck], rows
 
 
 def peaks_figure(ramp: Ramp) -> go.Figure:
-    """Draw the peak over the rate, relative to the steady-state one without bodies, and Lewis' closed form."""
+    """Draw the peak versus rate, relative to the steady-state peak without bodies, and Lewis' closed form."""
     figure = go.Figure()
     lewis = np.array([ramp.lewis_rate(run) for run in ramp.runs])
     rates = np.array([abs(run.rate) for run in ramp.runs])
@@ -194,7 +194,7 @@ def peaks_figure(ramp: Ramp) -> go.Figure:
 
 
 def _peaks_table(ramp: Ramp) -> Table:
-    """Return the peaks, a row per run."""
+    """Return the peaks, one row per run."""
     return ["rate", "peak", "peak_frequency", "peak_share", "lewis_rate"], [
         [run.rate, run.peak, run.at_peak("frequency"), ramp.share(run), ramp.lewis_rate(run)] for run in ramp.runs
     ]

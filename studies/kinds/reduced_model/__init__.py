@@ -16,14 +16,14 @@ RECORD = "vanedamp.ReducedModel"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
-    made = record.attributes.get("provenance", {})
+    """Yield its main results."""
+    provenance = record.attributes.get("provenance", {})
     frequencies = record.variables["natural_frequency"].values
     yield Fact("frequency_hz", frequencies[:MOST].tolist(), "Hz", "natural frequencies")
     yield Fact("interface", record.variables["interface"].values.tolist())
-    yield Fact("basis", made.get("basis"))
-    yield Fact("estimate", made.get("estimate", {}).get("sentence"))
-    yield from level_fact(made.get("fatigue"))
+    yield Fact("basis", provenance.get("basis"))
+    yield Fact("estimate", provenance.get("estimate", {}).get("sentence"))
+    yield from level_fact(provenance.get("fatigue"))
     for line in spot_lines(hot_spots(ReducedModel.load(record.path))):
         name, _, facts = line.partition(" ")
         yield Fact(name, facts)

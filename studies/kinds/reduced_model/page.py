@@ -1,4 +1,4 @@
-"""Reduced models: frequencies, the mass that an impact feels, and hot spots on the mesh."""
+"""Reduced models: frequencies, effective mass at impact, and hot spots on the mesh."""
 
 from __future__ import annotations
 
@@ -69,8 +69,8 @@ def _picture(file: str, model: ReducedModel, spots: Mapping[str, Mapping[str, An
     mesh = model.provenance.get("matrices", {}).get("mesh_sha256")
     for modes, result in page.results.kinds["modes"].items():
         values, attributes = result.record
-        same = result.provenance is not None and result.provenance["matrices"].get("mesh_sha256") == mesh
-        surface = small_surface(values) if same and "von_mises" in values else None
+        same_mesh = result.provenance is not None and result.provenance["matrices"].get("mesh_sha256") == mesh
+        surface = small_surface(values) if same_mesh and "von_mises" in values else None
         if surface is not None:
             figure = spots_figure(values, surface, int(attributes["first_bending"]), spots)
             return page.chart("spots", figure, ("x", "y", "z", "stress"), spots_rows(values, surface), [file, modes])

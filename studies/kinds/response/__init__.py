@@ -17,9 +17,9 @@ _OF_RUN = ("status", "classification", "frequency", "periods", "transient")
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     of = units()
-    names = [*_OF_RUN[:3], *(name for name, one in table().items() if not one.dims), *_OF_RUN[3:]]
+    names = [*_OF_RUN[:3], *(name for name, quantity in table().items() if not quantity.dims), *_OF_RUN[3:]]
     for name in names:
         if name in record.attributes or name in _OF_RUN:
             yield Fact(name, record.attributes.get(name), of.get(name, ""))

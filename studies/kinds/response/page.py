@@ -1,4 +1,4 @@
-"""Runs: results and energies, the time history and the motion in the plane where the run kept samples, impacts."""
+"""Runs: results and energies, impacts, and from samples the time history and the motion in the plane."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_orde
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sector_charts import sectors_shown
 from vanedamp.studies.report.strength import contacts_shown, spots_shown
-from vanedamp.studies.report.time_history import History, history_figure
+from vanedamp.studies.report.time_history import TimeHistory, history_figure
 
 ORDER = 60
 HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_impulse", "loss")
@@ -29,18 +29,18 @@ HEADER = ("body", "surface", "corner", "impacts", "normal_impulse", "tangential_
 def load(path: Path) -> Result:
     """Read what `vanedamp run` wrote."""
     response = Response.load(path)
-    return Result.of(History.of(response), None if response.scene is None else response.scene.to_dict())
+    return Result.of(TimeHistory.of(response), None if response.scene is None else response.scene.to_dict())
 
 
-def figure(record: History | Response) -> go.Figure:
-    """Draw the time history. Raises InputError for a run that kept no samples."""
-    history = record if isinstance(record, History) else History.of(record)
+def figure(record: TimeHistory | Response) -> go.Figure:
+    """Draw the time history. Raises InputError for a run without samples."""
+    history = record if isinstance(record, TimeHistory) else TimeHistory.of(record)
     if not len(history.time):
         raise InputError("plot: the run kept no samples; simulate(scene, events=True, samples_per_period=200)")
     return history_figure(history.late())
 
 
-def shown(file: str, history: History, page: Page) -> dict[str, Any]:
+def shown(file: str, history: TimeHistory, page: Page) -> dict[str, Any]:
     """Return the results of a run, its charts and its motion if it was sampled, its impacts if it kept events."""
     energies = history.measures["energy"]
     largest = max(map(abs, energies.values()), default=0.0)
@@ -65,7 +65,7 @@ def shown(file: str, history: History, page: Page) -> dict[str, Any]:
         measures = history.measures
         figure = impacts_figure(history.by_place, max(measures["periods"] - measures["transient"], 1))
         shown["impacts"] = page.chart("impacts", figure, HEADER, impacts_rows(history.by_place), [file])
-        shown["lost"] = sum(each.loss for each in history.by_place)
+        shown["lost"] = sum(site.loss for site in history.by_place)
     return shown
 
 
@@ -81,34 +81,34 @@ def _bodies(measures: Mapping[str, Any]) -> list[dict[str, float]]:
 
 def impacts_figure(impacts: Sequence[ImpactsAtPlace], periods: int) -> go.Figure:
     """Draw impacts per period, mean normal and tangential impulse, and energy taken per period, one bar per contact."""
-    known = bool(np.isfinite([each.loss for each in impacts]).all())
-    figure = make_subplots(rows=2 + known, cols=1, shared_xaxes=True, vertical_spacing=0.05)
-    for body in dict.fromkeys(each.body for each in impacts):
-        mine = [each for each in impacts if each.body == body]
-        places, count = [each.place for each in mine], np.array([each.impacts for each in mine])
+    has_loss = bool(np.isfinite([site.loss for site in impacts]).all())
+    figure = make_subplots(rows=2 + has_loss, cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    for body in dict.fromkeys(site.body for site in impacts):
+        of_body = [site for site in impacts if site.body == body]
+        names, count = [site.place for site in of_body], np.array([site.impacts for site in of_body])
         colour, name = COLOURS[body % len(COLOURS)], f"body {body + 1}"
-        normal = 1e3 * np.array([each.normal_impulse for each in mine]) / count
-        tangential = 1e3 * np.array([each.tangential_impulse for each in mine]) / count
+        normal = 1e3 * np.array([site.normal_impulse for site in of_body]) / count
+        tangential = 1e3 * np.array([site.tangential_impulse for site in of_body]) / count
         bars = [(1, count / periods, "impacts per period", "", 1.0), (2, normal, "normal impulse", " mN s", 1.0)]
         bars += [(2, tangential, "tangential impulse", " mN s", 0.4)]
-        if known:
-            loss = 1e6 * np.array([each.loss for each in mine]) / periods
+        if has_loss:
+            loss = 1e6 * np.array([site.loss for site in of_body]) / periods
             bars += [(3, loss, "energy per period", " µJ", 1.0)]
         for row, values, title, unit, opacity in bars:
             figure.add_bar(
-                x=places, y=values, marker={"color": colour, "opacity": opacity}, showlegend=row == 1,
+                x=names, y=values, marker={"color": colour, "opacity": opacity}, showlegend=row == 1,
                 name=name, legendgroup=name, offsetgroup=f"{body}{opacity}" if row == 2 else f"{body}",
                 hovertemplate=f"{name}, {title}: %{{y:.4g}}{unit}<extra></extra>", row=row, col=1,
             )  # fmt: skip
     figure.update_xaxes(categoryorder="array", categoryarray=places_in_order(impacts))
     figure.update_yaxes(title_text="impacts per period", row=1, col=1)
     figure.update_yaxes(title_text="mean impulse, mN s", row=2, col=1)
-    if known:
+    if has_loss:
         figure.update_yaxes(title_text="energy per period, µJ", row=3, col=1)
-    dressed(figure, height=240 * (2 + known))
+    dressed(figure, height=240 * (2 + has_loss))
     return figure.update_layout(barmode="group", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})
 
 
 def impacts_rows(impacts: Sequence[ImpactsAtPlace]) -> Iterator[tuple[object, ...]]:
-    """Yield a line a contact, bodies counted from 1, sums over the evaluated periods in SI units."""
-    yield from ((each.body + 1, *astuple(each)[1:]) for each in impacts)
+    """Yield one line per contact, bodies counted from 1, sums over the evaluated periods in SI units."""
+    yield from ((site.body + 1, *astuple(site)[1:]) for site in impacts)

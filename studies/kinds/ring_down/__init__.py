@@ -14,15 +14,15 @@ RECORD = "vanedamp.RingDown"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
-    found = RingDown.load(record.path)
-    half = found.half_cycles
-    yield Fact("status", found.status.value)
-    yield Fact("mode_hz", found.linear.frequency, "Hz", f"mode {found.linear.mode}, without bodies")
-    yield Fact("damping_ratio", found.linear.damping_ratio, "", "of it")
+    """Yield its main results."""
+    result = RingDown.load(record.path)
+    half = result.half_cycles
+    yield Fact("status", result.status.value)
+    yield Fact("mode_hz", result.linear.frequency, "Hz", f"mode {result.linear.mode}, without bodies")
+    yield Fact("damping_ratio", result.linear.damping_ratio, "", "of it")
     yield Fact("half_cycles", len(half.time))
     yield Fact("amplitude", half.amplitude[[0, -1]].tolist() if len(half.time) else None, "m", "first and last")
-    yield Fact("impacts", int(found.impacts.sum()))
-    yield Fact("rest_time", found.rest_time, "s")
-    for one, value in found.numbers:
-        yield Fact(one.name, value, one.unit, one.about)
+    yield Fact("impacts", int(result.impacts.sum()))
+    yield Fact("rest_time", result.rest_time, "s")
+    for quantity, value in result.numbers:
+        yield Fact(quantity.name, value, quantity.unit, quantity.about)

@@ -52,7 +52,7 @@ def shown(file: str, record: RingDown, page: Page) -> dict[str, Any]:
 
 
 def ring_down_rows(record: RingDown) -> Iterator[list[object]]:
-    """Yield a line per half cycle, with the window of cycles that begins with it."""
+    """Yield one line per half cycle, with the window of cycles that begins with it."""
     half, whole = record.half_cycles, record.cycles
     first = zip(
         half.time.tolist(), half.amplitude.tolist(), half.frequency.tolist(), record.impacts.tolist(), strict=True
@@ -63,7 +63,7 @@ def ring_down_rows(record: RingDown) -> Iterator[list[object]]:
 
 
 def figure(record: RingDown) -> go.Figure:
-    """Draw the turning points over the time, and frequency and damping over the amplitude."""
+    """Draw the turning points versus time, and frequency and damping versus amplitude."""
     figure = make_subplots(
         rows=2, cols=2, specs=[[{"colspan": 2}, None], [{}, {}]], row_heights=[0.4, 0.6], vertical_spacing=0.14,
         horizontal_spacing=0.12,
@@ -125,11 +125,11 @@ def _dots(colour: str, shown: str) -> dict[str, Any]:
 
 
 def _add_bins(figure: go.Figure, record: RingDown, name: str, colour: str, col: int) -> None:
-    found = record.bins[name]
+    means = record.bins[name]
     figure.add_scatter(
-        x=1e6 * np.sqrt(found.low * found.high), y=found.mean, mode="lines+markers", row=2, col=col,
+        x=1e6 * np.sqrt(means.low * means.high), y=means.mean, mode="lines+markers", row=2, col=col,
         name="means with 95 % confidence", legendgroup="bins", showlegend=name == "frequency",
-        error_y={"array": np.nan_to_num(found.confidence), "color": colour}, line={"color": colour, "width": 1.6},
+        error_y={"array": np.nan_to_num(means.confidence), "color": colour}, line={"color": colour, "width": 1.6},
         marker={"color": "#ffffff", "size": 8, "line": {"color": colour, "width": 2}},
         hovertemplate="mean, %{x:.5g} µm: %{y:.8g}<extra></extra>",
     )  # fmt: skip

@@ -16,7 +16,7 @@ RECORD = "vanedamp.RingModel"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     ring = load_ring(record.path)
     yield Fact("sectors", ring.sectors)
     yield Fact("frequency_hz", np.unique(ring.frequencies_hz)[:MOST].tolist(), "Hz", "of the tuned ring")

@@ -24,7 +24,7 @@ def shown(file: str, record: RingModel | SectorRing, page: Page) -> dict[str, An
 
 
 def figure(record: RingModel | SectorRing) -> go.Figure:
-    """Draw the natural frequencies over the nodal diameter, or over their number where sectors are the basis."""
+    """Draw the natural frequencies versus nodal diameter, or versus their number for a model by sectors."""
     (title, _), rows = _table(record)
     numbers, frequencies = np.array(rows, dtype=float).T
     drawn = go.Figure(go.Scatter(

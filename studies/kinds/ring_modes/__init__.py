@@ -16,12 +16,15 @@ RECORD = "vanedamp.Interference"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
-    found = Interference.load(record.path)
-    yield Fact("sectors", found.modes.sectors)
-    yield Fact("speed", found.speed, "rad/s")
-    rows = [f"diameter {found.label(h)}: " + ", ".join(f"{hz:.6g}" for hz in row if np.isfinite(hz))
-            for h, row in found.by_diameter()]  # fmt: skip
+    """Yield its main results."""
+    ring = Interference.load(record.path)
+    yield Fact("sectors", ring.modes.sectors)
+    yield Fact("speed", ring.speed, "rad/s")
+    rows = [f"diameter {ring.label(h)}: " + ", ".join(f"{hz:.6g}" for hz in row if np.isfinite(hz))
+            for h, row in ring.by_diameter()]  # fmt: skip
     yield Fact("frequencies", rows, "Hz", "by family")
-    met = found.in_operation
-    yield Fact("meetings", [f"{found.name(each.mode)} and order {each.order:g} at {each.rpm:.6g} rpm" for each in met])
+    met = ring.in_operation
+    yield Fact(
+        "meetings",
+        [f"{ring.name(meeting.mode)} and order {meeting.order:g} at {meeting.rpm:.6g} rpm" for meeting in met],
+    )

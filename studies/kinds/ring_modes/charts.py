@@ -19,9 +19,9 @@ _MOST_LABELS = 40
 
 
 def interference_figure(found: Interference) -> go.Figure:
-    """Draw frequency over nodal diameter by family, the folded lines of engine orders, and where these meet modes.
+    """Draw frequency versus nodal diameter by family, folded lines of engine orders, and their meetings with modes.
 
-    The lines are those of the ends of the range of operation. `customdata` of a mode is its number, from 0.
+    The lines are drawn for the ends of the operating range. `customdata` of a mode is its number, from 0.
     """
     figure, modes = go.Figure(), found.modes
     for speed, dash in zip(found.folded_speeds, ("solid", "dot"), strict=False):
@@ -36,7 +36,7 @@ def interference_figure(found: Interference) -> go.Figure:
             hovertemplate="%{hovertext}<br>%{y:.4f} Hz<extra></extra>",
         )  # fmt: skip
     met = found.in_operation
-    _add_meetings(figure, found, met, [int(found.diameters[each.mode]) for each in met])
+    _add_meetings(figure, found, met, [int(found.diameters[meeting.mode]) for meeting in met])
     dressed(figure, height=620)
     figure.update_xaxes(
         title_text="nodal diameter", range=[-0.3, 0.5 * modes.sectors + 0.3], dtick=max(1, round(modes.sectors / 40))
@@ -65,18 +65,18 @@ def _add_orders(figure: go.Figure, found: Interference, speed: float, dash: str)
 def _add_meetings(figure: go.Figure, found: Interference, meetings: Sequence[Crossing], x: Sequence[float]) -> None:
     if meetings:
         figure.add_scatter(
-            x=x, y=[each.frequency_hz for each in meetings], name="meetings", mode="markers", hoverinfo="text",
+            x=x, y=[meeting.frequency_hz for meeting in meetings], name="meetings", mode="markers", hoverinfo="text",
             hovertext=[
-                f"{found.name(each.mode)}, meets engine order {each.order:g}<br>{each.rpm:.3f} rpm "
-                f"({each.speed:.4f} rad/s)<br>{each.frequency_hz:.4f} Hz"
-                for each in meetings
+                f"{found.name(meeting.mode)}, meets engine order {meeting.order:g}<br>{meeting.rpm:.3f} rpm "
+                f"({meeting.speed:.4f} rad/s)<br>{meeting.frequency_hz:.4f} Hz"
+                for meeting in meetings
             ],
             marker={"size": 13, "symbol": "circle-open", "color": _MARK, "line": {"width": 2}},
         )  # fmt: skip
 
 
 def ring_campbell_figure(found: Interference) -> go.Figure:
-    """Draw the modes over the speed, a colour per nodal diameter, lines of engine orders, and their meetings."""
+    """Draw the modes versus speed, one colour per nodal diameter, lines of engine orders, and their meetings."""
     figure = go.Figure()
     top, rpm = 1.06 * float(np.nanmax(found.over_speed_hz)), found.speeds * RPM
     for order in found.orders:
@@ -96,7 +96,7 @@ def ring_campbell_figure(found: Interference) -> go.Figure:
             showlegend=bool(found.modes.families[mode] == 0 <= found.modes.diameters[mode]),
             hovertemplate=f"{found.name(mode)}<br>%{{x:.1f}} rpm<br>%{{y:.3f}} Hz<extra></extra>",
         )  # fmt: skip
-    _add_meetings(figure, found, found.meetings, [each.rpm for each in found.meetings])
+    _add_meetings(figure, found, found.meetings, [meeting.rpm for meeting in found.meetings])
     dressed(figure, height=620)
     figure.update_xaxes(title_text="speed, rpm", range=[rpm[0], rpm[-1]], tickformat=",d")
     figure.update_yaxes(title_text="natural frequency, Hz", range=[0.0, top])
@@ -112,6 +112,6 @@ def interference_table(found: Interference) -> Table:
 
 
 def ring_campbell_table(found: Interference) -> Table:
-    """Return the frequencies of the modes, a row per speed."""
+    """Return the frequencies of the modes, one row per speed."""
     header = ["speed, rad/s", "speed, rpm", *(f"{found.name(mode)}, Hz" for mode in range(len(found.diameters)))]
     return header, np.column_stack([found.speeds, found.speeds * RPM, found.over_speed_hz.T]).tolist()

@@ -28,8 +28,8 @@ ORDER = 15
 
 def load(path: Path) -> Result:
     """Read what `vanedamp ring` wrote."""
-    found, (values, _) = Interference.load(path), load_record(path, NAME)
-    return Result((found, ring_surface(found.modes, values)), found.modes.provenance)
+    ring, (values, _) = Interference.load(path), load_record(path, NAME)
+    return Result((ring, ring_surface(ring.modes, values)), ring.modes.provenance)
 
 
 def figure(record: Interference | tuple[Interference, WholeRing | None]) -> go.Figure:
@@ -39,19 +39,19 @@ def figure(record: Interference | tuple[Interference, WholeRing | None]) -> go.F
 
 def shown(file: str, record: tuple[Interference, WholeRing | None], page: Page) -> dict[str, Any]:
     """Return charts and tables of a ring."""
-    found, surface = record
-    diagram = page.chart("interference", interference_figure(found), *interference_table(found), [file])
+    ring, surface = record
+    diagram = page.chart("interference", interference_figure(ring), *interference_table(ring), [file])
     campbell, view = None, None
-    if found.speeds.size:
-        campbell = page.chart("ring-campbell", ring_campbell_figure(found), *ring_campbell_table(found), [file])
+    if ring.speeds.size:
+        campbell = page.chart("ring-campbell", ring_campbell_figure(ring), *ring_campbell_table(ring), [file])
     if surface is not None:
-        # begins with a wave that travels
-        mode = int(np.flatnonzero(found.diameters == np.unique(found.diameters)[:2][-1])[0])
+        # begin with a travelling wave
+        mode = int(np.flatnonzero(ring.diameters == np.unique(ring.diameters)[:2][-1])[0])
         view = page.chart(
-            "ring", ring_view(found.modes, surface, mode), *sector_table(found.modes, surface, mode), [file]
+            "ring", ring_view(ring.modes, surface, mode), *sector_table(ring.modes, surface, mode), [file]
         )
-    margins = [found.operating and format_margin(each.margin(found.operating)) for each in found.meetings]
+    margins = [ring.operating and format_margin(meeting.margin(ring.operating)) for meeting in ring.meetings]
     return {
-        "file": file, "diagram": diagram, "campbell": campbell, "view": view, "record": found, "margins": margins,
-        "rows": [(found.label(h), found.exciting(h), row) for h, row in found.by_diameter()],
+        "file": file, "diagram": diagram, "campbell": campbell, "view": view, "record": ring, "margins": margins,
+        "rows": [(ring.label(h), ring.exciting(h), row) for h, row in ring.by_diameter()],
     }  # fmt: skip

@@ -15,7 +15,7 @@ _ORDER, _MARK = "#64748b", "#111827"
 
 
 def interference_picture(found: Interference, path: Path) -> None:
-    """Write frequency over nodal diameter by family, folded lines of engine orders, and their meetings, as PNG."""
+    """Write frequency versus nodal diameter by family, folded lines of engine orders, and their meetings, as PNG."""
     figure, axes = subplots(size=(9.5, 6.0))
     modes = found.modes
     for speed, style in zip(found.folded_speeds, ("-", ":"), strict=False):
@@ -26,12 +26,12 @@ def interference_picture(found: Interference, path: Path) -> None:
         rows = rows[np.argsort(modes.diameters[rows])]
         colour, name = COLOURS[family % len(COLOURS)], f"family {family + 1}"
         axes.plot(found.diameters[rows], modes.frequencies_hz[rows], "o-", color=colour, markersize=5, label=name)
-    for each in found.in_operation:
-        at = (found.diameters[each.mode], each.frequency_hz)
-        axes.annotate(f"{each.order:g}", at, textcoords="offset points", xytext=(7, 0), va="center", fontsize=8)
+    for point in found.in_operation:
+        at = (found.diameters[point.mode], point.frequency_hz)
+        axes.annotate(f"{point.order:g}", at, textcoords="offset points", xytext=(7, 0), va="center", fontsize=8)
     if met := found.in_operation:
         axes.plot(
-            found.diameters[[each.mode for each in met]], [each.frequency_hz for each in met], "o", markersize=10,
+            found.diameters[[point.mode for point in met]], [point.frequency_hz for point in met], "o", markersize=10,
             markerfacecolor="none", markeredgecolor=_MARK, label="meetings, with their engine orders",
         )  # fmt: skip
     axes.set(xlim=(-0.3, 0.5 * modes.sectors + 0.6), ylim=(0.0, found.top), xlabel="nodal diameter")

@@ -21,20 +21,20 @@ from vanedamp.studies.report.mode_chart import (
 )
 from vanedamp.studies.ring_mesh import WholeRing, joints, whole_ring
 
-#: elevations of the eye above the horizon from which a ring is looked at, degrees
+#: elevations of the viewpoint above the horizon, degrees
 _ELEVATIONS = (55.0, 30.0)
-#: the longest side of the scene, as the eye's distance counts it
+#: longest side of the scene, in units of the viewing distance
 _SIDE = 1.8
 #: largest displacement over the ring's size
 _EXAGGERATION = 0.03
-#: of the shapes in a page, which are whole numbers
+#: resolution of the shapes in a page, which are whole numbers
 _STEPS = 32767
 
 
 def ring_surface(modes: RingModes, values: Mapping[str, np.ndarray]) -> WholeRing | None:
-    """Return the surface of a whole ring from its record's variables, its cells triangles, none of them in the joints.
+    """Return the surface of a whole ring from its record's variables, as triangles without those inside the joints.
 
-    Of a larger surface than a page can carry, nodes near each other become one. None for cells whose faces are not
+    If the surface is too large for a page, nearby nodes are merged. None for cells whose faces are not
     known, and for a record without a mesh.
     """
     if "cell" not in values or (skin := small_surface(values, np.inf)) is None:
@@ -56,7 +56,7 @@ def _edge(ring: WholeRing) -> float:
 
 
 def _coarser(ring: WholeRing, size: float) -> WholeRing:
-    """Return the surface with the nodes of every cube of a size as one, the first of them."""
+    """Return the surface with all nodes in each cube of the given size merged into the first."""
     _, first, cube = np.unique(np.floor(ring.points / size), axis=0, return_index=True, return_inverse=True)
     corners = first[cube.ravel()][ring.cells]
     a, b, c = corners.T
@@ -72,7 +72,7 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     of every mode the diameter and the shape on sector 0 at these nodes over its largest displacement, as whole numbers.
     """
     points, named = 1e3 * ring.points, Interference(modes)
-    nodes, place = np.unique(ring.node, return_inverse=True)
+    nodes, node_index = np.unique(ring.node, return_inverse=True)
     shapes = modes.shapes.reshape(len(modes.shapes), -1, 3)[:, nodes]
     largest = np.sqrt((np.abs(shapes) ** 2).sum(axis=2)).max(axis=1)
     relative = np.stack([shapes.real, shapes.imag], axis=-1) / largest[:, None, None, None]
@@ -80,7 +80,7 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     scale = _EXAGGERATION * float(np.linalg.norm(np.ptp(points, axis=0)))
     figure = go.Figure(deformed_mesh(points + scale * moved, np.linalg.norm(moved, axis=1), ring.cells))
     in_space(figure, viewpoint(points, moved, _ELEVATIONS))
-    # the axes stay while the wave travels
+    # fixed axes while the wave travels
     low, high = points.min(axis=0) - scale, points.max(axis=0) + scale
     for name, ends in zip("xyz", np.column_stack([low, high]).tolist(), strict=True):
         figure.layout.scene[f"{name}axis"].range = ends
@@ -89,19 +89,19 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
     return figure.update_layout(meta={
         "mode": mode, "scale": scale, "sectors": modes.sectors, "diameters": modes.diameters.tolist(),
         "families": modes.families.tolist(), "frequencies": modes.frequencies_hz.tolist(),
-        "names": [named.name(place) for place in range(len(modes))],
+        "names": [named.name(index) for index in range(len(modes))],
         "turns": turns(modes.axis, modes.sectors).reshape(-1, 9).tolist(), "rest": _packed(points, "<f4"),
-        "sector": _packed(ring.sector, "<u2"), "node": _packed(place, "<u4"),
+        "sector": _packed(ring.sector, "<u2"), "node": _packed(node_index, "<u4"),
         "shapes": _packed(np.rint(_STEPS * relative), "<i2"), "steps": _STEPS,
     })  # fmt: skip
 
 
 def sector_table(modes: RingModes, ring: WholeRing, mode: int) -> Table:
     """Return x, y, z (m) of the surface's nodes in sector 0, and real and imaginary part of a mode's shape there."""
-    own = ring.sector == 0
-    shape = modes.shapes[mode].reshape(-1, 3)[ring.node[own]]
-    header = [*"xyz", *(f"d{axis} {part}" for part in ("real", "imaginary") for axis in "xyz")]
-    return header, np.column_stack([ring.points[own], shape.real, shape.imag]).tolist()
+    in_sector = ring.sector == 0
+    shape = modes.shapes[mode].reshape(-1, 3)[ring.node[in_sector]]
+    header = [*"xyz", *(f"d{axis} {component}" for component in ("real", "imaginary") for axis in "xyz")]
+    return header, np.column_stack([ring.points[in_sector], shape.real, shape.imag]).tolist()
 
 
 def _packed(values: np.ndarray, dtype: str) -> str:

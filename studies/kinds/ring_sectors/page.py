@@ -1,4 +1,4 @@
-"""Reduced models of rings by sectors: shown as those by modes."""
+"""Reduced models of rings by sectors, shown like those by modes."""
 
 from __future__ import annotations
 

@@ -17,14 +17,14 @@ RECORD = "vanedamp.Sweep"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     sweep = Sweep.load(record.path)
     units = sweep.units()
     ends = {path: f"{values[0]} to {values[-1]} {units[path]}".strip() for path, values in sweep.axes.items()}
     yield Fact("axes", {path: f"{ends[path]}, {len(values)} values" for path, values in sweep.axes.items()})
     for name, texts in (("status", sweep.status), ("classification", sweep.classification)):
         yield Fact(name, dict(Counter(map(str, texts.ravel()))), "", "points")
-    found = [design for design in designs(forced_responses(sweep)) if design.worst.reference > 0]
-    yield Fact("response", [design.sentence for design in found[:1]], "", "best design, by its worst curve")
-    yield Fact("designs", len(found))
-    yield Fact("curves", sum(len(design.curves) for design in found))
+    rated = [design for design in designs(forced_responses(sweep)) if design.worst.reference > 0]
+    yield Fact("response", [design.sentence for design in rated[:1]], "", "best design, by its worst curve")
+    yield Fact("designs", len(rated))
+    yield Fact("curves", sum(len(design.curves) for design in rated))

@@ -1,4 +1,4 @@
-"""Bifurcation diagram of a sweep that keeps Poincare sections: the states at the starts of periods over an axis."""
+"""Bifurcation diagram of a sweep with Poincare sections: the states at the starts of periods versus an axis."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.studies.report.charts import axis_title, dressed
 from vanedamp.studies.report.forced_response import for_people, setting
 
-#: panels that are drawn; points of all of them, of more the last sections of each run
+#: largest number of panels; largest number of points, above which only the last sections of each run are drawn
 MOST_PANELS, _MOST_POINTS = 12, 30_000
-#: heights of sections, of the exponent below them, and of the space between two, px
+#: heights of sections, of the exponents below them, and of the space between panels, px
 _TALL, _LOW, _BETWEEN = 330, 150, 70
 #: colours of motions, by their words
 _COLOURS = {
@@ -39,7 +39,7 @@ class Panel(NamedTuple):
 
 
 def diagram_axis(sweep: Sweep) -> str | None:
-    """Return the axis of a sweep's bifurcation diagram, the frequency or else its longest of numbers; None without."""
+    """Return the axis of a sweep's bifurcation diagram: the frequency, or the longest numeric axis; None without."""
     numeric = [path for path, values in sweep.axes.items() if values.dtype.kind in "if" and not is_start(path)]
     numeric.sort(key=lambda path: (path != FREQUENCY, -len(sweep.axes[path])))
     long = [path for path in numeric if len(sweep.axes[path]) > 1]
@@ -51,35 +51,35 @@ def diagram_panels(sweep: Sweep) -> list[Panel]:
     axis, units, paths = diagram_axis(sweep), sweep.units(), list(sweep.axes)
     assert axis is not None
     order = np.argsort(sweep.axes[axis], kind="stable")
-    others, found = [path for path in paths if path != axis], []
+    other_paths, panels = [path for path in paths if path != axis], []
     quantities = {"structure": sweep.sections["section_displacement"]}
     slip = sweep.sections.get("section_slip")
     for body in range(0 if slip is None else slip.shape[-1]):
         quantities[f"body {body + 1} in its cavity"] = slip[..., body]
-    for values in itertools.product(*(range(len(sweep.axes[path])) for path in others)):
-        at = dict(zip(others, values, strict=True))
-        place = tuple(order if path == axis else at[path] for path in paths)
-        ok = (sweep.status[place] == "ok")[:, None]
+    for values in itertools.product(*(range(len(sweep.axes[path])) for path in other_paths)):
+        at = dict(zip(other_paths, values, strict=True))
+        point = tuple(order if path == axis else at[path] for path in paths)
+        ok = (sweep.status[point] == "ok")[:, None]
         name = ", ".join(setting(path, sweep.axes[path][index], units[path]) for path, index in at.items())
         exponents = [
-            sweep.exponents[key][place] if sweep.exponents else None for key in ("exponent", "exponent_confidence")
+            sweep.exponents[key][point] if sweep.exponents else None for key in ("exponent", "exponent_confidence")
         ]
-        sections = {name: np.where(ok, values[place], np.nan) for name, values in quantities.items()}
-        found.append(Panel(name, sweep.axes[axis][order], sections, _words(sweep, place), *exponents))
-    return found
+        sections = {name: np.where(ok, values[point], np.nan) for name, values in quantities.items()}
+        panels.append(Panel(name, sweep.axes[axis][order], sections, _words(sweep, point), *exponents))
+    return panels
 
 
-def _words(sweep: Sweep, place: tuple[np.ndarray | int, ...]) -> np.ndarray:
-    """Return the motions at some points: by their exponents, or else by their classification."""
+def _words(sweep: Sweep, point: tuple[np.ndarray | int, ...]) -> np.ndarray:
+    """Return the names of motions at some points: from their exponents, or else from their classification."""
     if sweep.exponents:
-        return np.asarray(sweep.exponents["motion"][place])
-    kinds = (str(kind).partition("-")[0] for kind in sweep.classification[place])
-    known = {"periodic": "periodic", "non": "non-periodic"}
-    return np.array([known.get(kind, "without impacts") for kind in kinds], object)
+        return np.asarray(sweep.exponents["motion"][point])
+    kinds = (str(kind).partition("-")[0] for kind in sweep.classification[point])
+    words = {"periodic": "periodic", "non": "non-periodic"}
+    return np.array([words.get(kind, "without impacts") for kind in kinds], object)
 
 
 def bifurcation_figure(sweep: Sweep) -> go.Figure:
-    """Draw the sections over the axis, coloured by motion, and exponents below them; a menu of quantities."""
+    """Draw the sections versus the axis, coloured by motion, with exponents below them and a menu of quantities."""
     axis, panels = diagram_axis(sweep), diagram_panels(sweep)[:MOST_PANELS]
     assert axis is not None
     factor, unit = for_people(sweep.units()[axis])
@@ -124,15 +124,15 @@ def _add_exponents(figure: go.Figure, panel: Panel, factor: float, row: int) -> 
 
 
 def _clouds(panel: Panel, most: int) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
-    """Yield quantity, motion, and points (k,) of it, of a panel with more than `most` the last sections."""
+    """Yield quantity, motion, and its points (k,); only the last sections of a panel with more than `most` points."""
     for quantity, values in panel.sections.items():
         values = values[:, -max(1, most // len(values)) :]
         for word in dict.fromkeys(panel.motion):
-            own = np.flatnonzero(panel.motion == word)
-            x, y = np.repeat(panel.x[own], values.shape[1]), values[own].ravel()
-            known = np.isfinite(y)
-            if known.any():
-                yield quantity, word, x[known], y[known]
+            rows = np.flatnonzero(panel.motion == word)
+            x, y = np.repeat(panel.x[rows], values.shape[1]), values[rows].ravel()
+            finite = np.isfinite(y)
+            if finite.any():
+                yield quantity, word, x[finite], y[finite]
 
 
 def _menu(figure: go.Figure, quantities: list[str]) -> dict[str, object]:
@@ -154,10 +154,10 @@ def bifurcation_header(sweep: Sweep) -> tuple[str, ...]:
 
 
 def bifurcation_rows(sweep: Sweep) -> Iterator[list[object]]:
-    """Yield a line per section of every point of the panels drawn, in SI units."""
+    """Yield one line per section of every point of the drawn panels, in SI units."""
     for panel in diagram_panels(sweep)[:MOST_PANELS]:
-        known = panel.exponent is not None and panel.confidence is not None
+        has_exponent = panel.exponent is not None and panel.confidence is not None
         stacked = np.stack(list(panel.sections.values()), axis=-1)
         for i, x in enumerate(panel.x.tolist()):
-            more = [panel.motion[i], *([panel.exponent[i], panel.confidence[i]] if known else ["", ""])]  # type: ignore[index]
+            more = [panel.motion[i], *([panel.exponent[i], panel.confidence[i]] if has_exponent else ["", ""])]  # type: ignore[index]
             yield from ([panel.name, x, s, *values, *more] for s, values in enumerate(stacked[i].tolist()))

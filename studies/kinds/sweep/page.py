@@ -1,4 +1,4 @@
-"""Sweeps: forced responses along an axis, impact mistuning, where the energy goes, and maps over two axes."""
+"""Sweeps: forced responses along an axis, impact mistuning, energy losses, and maps over two axes."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ from vanedamp.studies.report.sector_charts import ring_shown
 from vanedamp.studies.report.strength import limited, sweep_shown
 
 ORDER = 50
-#: curves of a page, of more the best; drawn at first, of which the reader picks others; panels of the energy
+#: largest number of curves (the best ones); curves drawn at first, others by choice; panels of the energy
 _MOST_CURVES, _DRAWN, _MOST_PANELS = 240, 8, 6
 #: steady states in the table below basins
 _MOST_STATES = 24
@@ -67,7 +67,7 @@ _COLUMNS = {
 
 
 def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
-    """Return groups of responses that share an axis, maps, where runs end, and remarks about the bodies."""
+    """Return groups of responses along a common axis, maps, basins, and remarks about the bodies."""
     sweeps = {file: result.record for file, result in results.items()}
     return {
         "groups": [_group(group, sweeps, page) for group in _by_axis(_responses(sweeps, page))],
@@ -82,7 +82,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
 
 
 def figure(record: Sweep) -> go.Figure:
-    """Draw forced responses, the best of many; a bifurcation diagram where sections are kept."""
+    """Draw forced responses, the best of many; a bifurcation diagram for a sweep with sections."""
     if diagram_axis(record):
         return bifurcation_figure(record)
     responses = best_first(forced_responses(record))[:_DRAWN]
@@ -115,9 +115,9 @@ def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
 
 
 def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], page: Page) -> dict[str, Any]:
-    """Return charts and table of the responses along one axis, best design first; a study's keep their order."""
+    """Return charts and table of the responses along one axis, best design first; those of a study keep their order."""
     every = len(responses)
-    places = {response.name: place for place, response in enumerate(responses)}
+    positions = {response.name: position for position, response in enumerate(responses)}
     if page.study is None:
         responses = best_first(responses)[:_MOST_CURVES]
     shown = [response.name for response in responses[: every if page.study is not None else _DRAWN]]
@@ -140,19 +140,19 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
         {
             "name": response.name, "headline": response.headline, "shown": response.name in shown, "colour": colour,
             "impacts": max(response.impacts_per_period[np.isfinite(response.damped_mean)], default=math.nan),
-            "place": places[response.name],
+            "place": positions[response.name],
         }
         for response, colour in zip(responses, cycle(len(responses)), strict=True)
     ]  # fmt: skip
     return charts | {
-        "axis": axis, "units": responses[0].units, "onset_of": max((each.onset_of for each in responses), key=len),
+        "axis": axis, "units": responses[0].units, "onset_of": max((curve.onset_of for curve in responses), key=len),
         "rows": rows, "every": every, "panels": len(panels),
         "picks": len(rows) > 1,
     }  # fmt: skip
 
 
 def _plane_chart(responses: Sequence[ForcedResponse], shown: Collection[str], page: Page) -> Chart | None:
-    """Return tilt and lift of the bodies in the plane; None without any."""
+    """Return the chart of tilt and lift of planar bodies; None without any."""
     planar = [response for response in responses if bodies_in_plane(response)]
     if not planar:
         return None
@@ -167,7 +167,7 @@ def _plane_chart(responses: Sequence[ForcedResponse], shown: Collection[str], pa
 
 
 def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Iterator[list[Any]]:
-    """Yield a line a point: name, place on the axis, and the columns in SI units."""
+    """Yield one line per point: name, value of the axis, and the columns in SI units."""
     for response in responses:
         shares = dict(zip(LOSSES, response.energy_share.T, strict=True))
         values = [shares[name] if name in shares else getattr(response, name) for name in columns]
@@ -175,7 +175,7 @@ def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Itera
 
 
 def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    """Return the charts of where the runs of a sweep over starts end, and the states in the basins' panels."""
+    """Return the charts of basins of a sweep over starts, and the steady states in their panels."""
     states = steady_states(sweep)
     shown: dict[str, Any] = {"starts": states.starts, "basins": None, "counts": None, "rows": []}
     if axes := basin_axes(sweep):
@@ -190,7 +190,7 @@ def _ends(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
 
 
 def _diagram(file: str, sweep: Sweep, page: Page) -> dict[str, Any]:
-    """Return the bifurcation diagram of a sweep that keeps sections."""
+    """Return the bifurcation diagram of a sweep with sections."""
     header, panels = bifurcation_header(sweep), len(diagram_panels(sweep))
     chart = page.chart("bifurcations", bifurcation_figure(sweep), header, bifurcation_rows(sweep), [file])
     return {"chart": chart, "panels": panels, "drawn": min(panels, PANELS), "exponents": bool(sweep.exponents)}

@@ -15,7 +15,7 @@ RECORD = "vanedamp.SystemMatrices"
 
 
 def facts(record: Found) -> Iterator[Fact]:
-    """Yield its figures."""
+    """Yield its main results."""
     of = {name: np.asarray(variable.values) for name, variable in record.variables.items()}
     yield Fact("nodes", len(of["coordinates"]))
     yield Fact("fixed", len(of["fixed"]), "", f"of {len(of['stiffness_row_start']) - 1} degrees of freedom")

@@ -13,7 +13,7 @@ from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 
 ORDER = 12
-#: nodes that are drawn, evenly chosen of more
+#: largest number of drawn nodes; of more, an even selection
 _MOST = 20_000
 
 
@@ -25,7 +25,7 @@ def shown(file: str, record: SystemMatrices, page: Page) -> dict[str, Any]:
 
 
 def figure(record: SystemMatrices) -> go.Figure:
-    """Draw the nodes: free, held and those of patches."""
+    """Draw the nodes: free, fixed and on patches."""
     drawn = go.Figure()
     count = len(record.coordinates)
     held = np.unique(record.fixed // 3)

@@ -16,7 +16,7 @@ from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.store import load
 from vanedamp.files.toml_input import validate
-from vanedamp.studies.report.time_history import History
+from vanedamp.studies.report.time_history import TimeHistory
 
 GAP = 6e-3
 _BODY = {"cavity": "c", "mass": 0.04, "restitution": 0.6}
@@ -141,7 +141,7 @@ def test_a_run_that_hangs_on_its_start_says_so(tmp_path):
     assert not apart.warnings and not default.warnings
     found.save(tmp_path / "run.h5")
     assert json.loads(load(tmp_path / "run.h5", "response")[1]["moved_start"]) == told == found.to_json()["moved_start"]
-    assert list(History.load(tmp_path / "run.h5").measures["warnings"]) == list(found.warnings)
+    assert list(TimeHistory.load(tmp_path / "run.h5").measures["warnings"]) == list(found.warnings)
 
 
 def test_a_run_that_goes_on_from_a_state_is_checked_from_there():

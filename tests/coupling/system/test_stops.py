@@ -17,7 +17,7 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.report.time_history import History, history_figure
+from vanedamp.studies.report.time_history import TimeHistory, history_figure
 
 DAMPING, RESTITUTION, GAP = 0.1, 0.8, 1.0
 
@@ -192,7 +192,7 @@ def test_modes_are_not_chosen_without_knowing_the_stops(tmp_path):
 def test_the_history_shows_stop_and_impacts(tmp_path):
     scene = oscillator(1.0, time={"periods": 30, "transient": 0})
     simulate(scene, events=True, samples_per_period=50).save(tmp_path / "run.h5", {"scene": scene.to_dict()})
-    history = History.load(tmp_path / "run.h5")
+    history = TimeHistory.load(tmp_path / "run.h5")
     assert len(history.struck)
     assert set(history.struck) == {-1}
     figure = history_figure(history)

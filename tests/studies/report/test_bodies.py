@@ -24,7 +24,7 @@ from vanedamp.studies.cli import main
 from vanedamp.studies.report.motion import CLOSED, HIT, OPEN
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
-from vanedamp.studies.report.time_history import History
+from vanedamp.studies.report.time_history import TimeHistory
 
 SAMPLES, PERIODS, DROPPED = 60, 12, 4
 GAP, PLAY = 2e-3, 1e-3
@@ -112,7 +112,7 @@ def test_gaps_are_drawn_as_they_are(model, folder, response):
     """In units of the drawing a gap is `scale * factor` times as large, whatever cavity and body do."""
     if model == "reduced":
         response = run_of(folder / "reduced.h5", **reduced(folder))
-    motion = History.load(folder / ("run.h5" if model == "rigid" else "reduced.h5")).motion()
+    motion = TimeHistory.load(folder / ("run.h5" if model == "rigid" else "reduced.h5")).motion()
     frames, met = slice(-3 * SAMPLES, None), set()
     for cavity in motion.cavities:
         by_number = {body.number: body for body in cavity.bodies}
@@ -136,7 +136,7 @@ def test_gaps_are_drawn_as_they_are(model, folder, response):
 def test_walls_and_ceilings_that_turn_are_drawn_so(folder):
     """A gap at one corner that is larger for an instant: there the surface has moved away, by as much as it says."""
     run_of(folder / "alone.h5", **ALONE)
-    history = History.load(folder / "alone.h5")
+    history = TimeHistory.load(folder / "alone.h5")
     more = 1e-4
     for side, corner in (("right", 2), ("left", 0), ("ceiling", 3)):
         gap = history.plane.contact_gap.copy()
@@ -157,7 +157,7 @@ def test_walls_and_ceilings_that_turn_are_drawn_so(folder):
 
 def test_faces_meet_where_they_are_drawn(folder, response):
     """The points of a contact between neighbours, on the left one, are a gap apart from the right one."""
-    motion = History.load(folder / "run.h5").motion()
+    motion = TimeHistory.load(folder / "run.h5").motion()
     row, discs, _ = motion.cavities
     unit = motion.scale * motion.factor
     gaps = response.in_plane.contact_gap[-3 * SAMPLES :]
@@ -177,7 +177,7 @@ def test_faces_meet_where_they_are_drawn(folder, response):
 
 
 def test_contacts_are_lit_while_closed_and_after_hits(folder, response):
-    motion = History.load(folder / "run.h5").motion()
+    motion = TimeHistory.load(folder / "run.h5").motion()
     frames, period = slice(-3 * SAMPLES, None), 1 / 31.0
     closed = response.in_plane.contact_closed[frames]
     hits = {}
@@ -217,7 +217,7 @@ def test_page_plays_the_samples(page, folder):
             continue
         np.testing.assert_allclose(body["lift"], 1e6 * values["body_lift"][frames, k], atol=1e-3)
         np.testing.assert_allclose(body["tilt"], 1e3 * values["body_tilt"][frames, k], atol=1e-4)
-    motion = History.load(folder / "run.h5").motion()
+    motion = TimeHistory.load(folder / "run.h5").motion()
     outline = motion.cavities[0].bodies[0].outline * (1, -1)
     np.testing.assert_allclose(np.reshape(bodies[0]["outline"], outline.shape), outline, atol=0.01)
     assert f"drawn {motion.factor:.6g} times as large" in page

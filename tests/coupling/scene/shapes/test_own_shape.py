@@ -19,7 +19,7 @@ from vanedamp.files.reference import key_in, schema
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.studies.report.page import write_report
 from vanedamp.studies.report.results import collect
-from vanedamp.studies.report.time_history import History
+from vanedamp.studies.report.time_history import TimeHistory
 
 
 class Chamfered(Polygon):
@@ -166,7 +166,7 @@ def test_the_report_draws_its_outline(tmp_path):
     scene = planar_scene(SHAKEN, body, periods=4, gap=2e-3, play=1e-3)
     response = simulate(scene, events=True, samples_per_period=60)
     response.save(tmp_path / "run.h5", {"scene": scene.to_dict()})
-    history = History.load(tmp_path / "run.h5")
+    history = TimeHistory.load(tmp_path / "run.h5")
     motion = history.motion()
     (cavity,) = motion.cavities
     outline, unit = cavity.bodies[0].outline, motion.factor * motion.scale
