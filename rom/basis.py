@@ -46,14 +46,14 @@ class ReductionBasis:
         keep_recovery: bool = False, quasi_static: int = 0, characteristic: int = 6,
     ) -> ReducedModel:  # fmt: skip
         """Return the model with that many modes. Arguments and errors: see rom.reduction.reduce."""
-        given = matrices, interface
+        structure = matrices, interface
         if self.held:
             most = interface.motions.shape[1] - len(interface.labels) - interface.full.size
-            kept = min(max(2 * modes, modes + 10), most) if self.without_mass else modes
-            model = craig_bampton.reduce(*given, kept, factorize, keep_recovery, quasi_static, characteristic)
+            enough = min(max(2 * modes, modes + 10), most) if self.without_mass else modes
+            model = craig_bampton.reduce(*structure, enough, factorize, keep_recovery, quasi_static, characteristic)
         else:
             blocks = self.attached + (quasi_static if self.more else 0)
-            model = free_interface.reduce_free(*given, modes, factorize, keep_recovery, blocks)
+            model = free_interface.reduce_free(*structure, modes, factorize, keep_recovery, blocks)
         return massless(model, modes) if self.without_mass else model
 
     def rich(
@@ -107,8 +107,8 @@ def basis_ladder(
     rich: ReducedModel, basis: str, frequencies_hz: np.ndarray, labels: Sequence[str] | None = None
 ) -> list[Rung]:
     """Return the error of every model of a basis that can be cut from a rich one, against the latter."""
-    found = basis_named(basis)
-    models = [(modes, found.cut(rich, modes)) for modes in range(found.least_modes(rich), rich.modes + 1)]
+    reduction = basis_named(basis)
+    models = [(modes, reduction.cut(rich, modes)) for modes in range(reduction.least_modes(rich), rich.modes + 1)]
     return [
         Rung(modes, model.size, float(frf_errors(model, rich, frequencies_hz, labels).max()), 0.0)
         for modes, model in models

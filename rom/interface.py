@@ -118,8 +118,8 @@ def plane_motion(
     second /= np.linalg.norm(second)
     groups = (facets,) if isinstance(facets, str) else tuple(facets)
     (patch, centroid, offsets), point = _around(matrices, groups), None
-    known = any(matrices.patch(group).normal.any() for group in groups)
-    if kind == "patch" and known and np.linalg.norm(patch.normal) < _ONE_WAY:
+    oriented = any(matrices.patch(group).normal.any() for group in groups)
+    if kind == "patch" and oriented and np.linalg.norm(patch.normal) < _ONE_WAY:
         raise InterfaceError(
             f'{label}: {", ".join(groups)} faces several ways; take kind = "cavity" for all surfaces of a cavity, or '
             "one entry for each surface"
@@ -127,15 +127,15 @@ def plane_motion(
     if kind == "cavity":
         middle = 0.5 * (np.min(offsets @ first) + np.max(offsets @ first))
         point = _triple(centroid + middle * first + np.min(offsets @ second) * second)
-    own, one = "node" if kind == "node" else "average", facets if isinstance(facets, str) else groups
+    point_kind, surface = "node" if kind == "node" else "average", facets if isinstance(facets, str) else groups
     motion = [
-        InterfaceCoordinate(label, one, _triple(first), own, point=point),
-        InterfaceCoordinate(label + NORMAL, one, _triple(second), own, point=point),
+        InterfaceCoordinate(label, surface, _triple(first), point_kind, point=point),
+        InterfaceCoordinate(label + NORMAL, surface, _triple(second), point_kind, point=point),
     ]
     if kind == "node":
         return motion
     axis = _triple(np.cross(first, second))
-    return [*motion, InterfaceCoordinate(label + ROTATION, one, axis, own, "rotation")]
+    return [*motion, InterfaceCoordinate(label + ROTATION, surface, axis, point_kind, "rotation")]
 
 
 def normal_direction(matrices: SystemMatrices, facets: str | Sequence[str]) -> tuple[float, float, float]:
@@ -300,11 +300,11 @@ def _motions(matrices: SystemMatrices, rigid: Sequence[str | tuple[str, ...]]) -
     """
     free = np.zeros(matrices.size, dtype=bool)
     free[matrices.free] = True
-    rest, count, blocks = free.copy(), np.zeros(matrices.size), []
+    outside, count, blocks = free.copy(), np.zeros(matrices.size), []
     for facets in rigid:
         patch, _, offsets = _around(matrices, facets)
         dofs = (3 * patch.nodes[:, None] + np.arange(3)).ravel()
-        rest[dofs] = False
+        outside[dofs] = False
         count[dofs] += 1.0
         basis = rigid_basis(offsets)
         columns = np.tile(np.arange(basis.shape[1]), len(dofs))
@@ -312,7 +312,7 @@ def _motions(matrices: SystemMatrices, rigid: Sequence[str | tuple[str, ...]]) -
         blocks.append(sparse.csr_array((basis.ravel(), (np.repeat(dofs, basis.shape[1]), columns)), shape=shape))
     if np.any(count > 1.0) or np.any(count[~free]):
         blocks = [_joined(blocks, count, free)]
-    others = np.flatnonzero(rest)
+    others = np.flatnonzero(outside)
     identity = sparse.csr_array((np.ones(others.size), (others, np.arange(others.size))), (matrices.size, others.size))
     return sparse.csr_array(sparse.hstack([identity, *blocks]))
 
@@ -329,14 +329,14 @@ def _joined(blocks: Sequence[sparse.csr_array], count: np.ndarray, free: np.ndar
     # every patch's motion of a tied DOF is the mean of the patches', zero at supports
     gaps, start = [], 0
     for block in blocks:
-        own = np.zeros((tied.size, every.shape[1]))
-        own[:, start : start + block.shape[1]] = block[tied].toarray()
-        inside = own.any(axis=1)
-        gaps.append(own[inside] - mean[tied[inside]].toarray())
+        motions = np.zeros((tied.size, every.shape[1]))
+        motions[:, start : start + block.shape[1]] = block[tied].toarray()
+        inside = motions.any(axis=1)
+        gaps.append(motions[inside] - mean[tied[inside]].toarray())
         start += block.shape[1]
     _, singular, right = np.linalg.svd(np.linalg.qr(np.concatenate(gaps), mode="r"))
-    left = right[np.count_nonzero(singular > _STRAIGHT * singular[0]) :].T
-    return sparse.csr_array(mean @ left)
+    compatible = right[np.count_nonzero(singular > _STRAIGHT * singular[0]) :].T
+    return sparse.csr_array(mean @ compatible)
 
 
 def rigid_motions(offsets: np.ndarray) -> np.ndarray:

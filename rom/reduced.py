@@ -135,8 +135,8 @@ class ReducedModel(Record):
         if damping_ratio is not None:
             check_mass(mass)
             damping = modal_damping(mass, stiffness, damping_ratio)
-        known = dict(directions or {})
-        unknown = sorted(set(known) - set(interface))
+        vectors = dict(directions or {})
+        unknown = sorted(set(vectors) - set(interface))
         if unknown:
             raise ReducedModelError(
                 f"directions: no interface coordinate {unknown[0]!r}; there are: {', '.join(interface)}"
@@ -147,7 +147,7 @@ class ReducedModel(Record):
             stiffness=stiffness,
             interface=tuple(interface),
             selection=np.reshape(rows, (-1, size)),
-            directions=np.array([known.get(label, (0.0, 0.0, 0.0)) for label in interface]).reshape(-1, 3),
+            directions=np.array([vectors.get(label, (0.0, 0.0, 0.0)) for label in interface]).reshape(-1, 3),
             base_load=np.zeros((size, 3)) if base_load is None else base_load,
             damping_ratio=damping_ratio,
             **others,
@@ -340,13 +340,13 @@ class ReducedModel(Record):
         return self.interface.index(label)
 
 
-def _row(label: str, given: Any, size: int) -> Any:
+def _row(label: str, coordinate: Any, size: int) -> Any:
     """Return the row (size,) of a coordinate's number; a row as it is."""
-    if not isinstance(given, int | np.integer):
-        return given
-    if not 0 <= given < size:
+    if not isinstance(coordinate, int | np.integer):
+        return coordinate
+    if not 0 <= coordinate < size:
         raise ReducedModelError(f"interface: {label!r}: expected the number of a coordinate, 0 to {size - 1}")
-    return np.eye(size)[given]
+    return np.eye(size)[coordinate]
 
 
 def _with_residual(values: np.ndarray, residual: np.ndarray | None, forces: np.ndarray | None) -> np.ndarray:
@@ -372,10 +372,13 @@ def _checked(model: ReducedModel) -> dict[str, Any]:
     }
     required = {*_REQUIRED, *(["coordinates"] if nodes else []), *(["output_rows"] if model.outputs else [])}
     for name, (_, layout) in declared(ReducedModel).items():
-        given = getattr(model, name)
-        if isinstance(layout, Array) and layout.dtype is float and (given is not None or name in required):
-            shape, mirrored = tuple(lengths[one] for one in layout.dims), layout.dims in (_SQUARE, _COMPLIANCE)
-            values[name] = symmetric(name, given, shape[0]) if mirrored else shaped(name, given, shape)
+        value = getattr(model, name)
+        if isinstance(layout, Array) and layout.dtype is float and (value is not None or name in required):
+            shape, mirrored = (
+                tuple(lengths[dimension] for dimension in layout.dims),
+                layout.dims in (_SQUARE, _COMPLIANCE),
+            )
+            values[name] = symmetric(name, value, shape[0]) if mirrored else shaped(name, value, shape)
     check_mass(values["mass"])
     values["directions"] = unit(values["directions"])
     return values

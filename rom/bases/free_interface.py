@@ -100,9 +100,9 @@ def _attachments(
                 break
         return response
 
-    known = shapes.T @ vectors
-    block = static(vectors - inertia @ known)
+    components = shapes.T @ vectors
+    block = static(vectors - inertia @ components)
     elastic = squares > 0.0
-    known_part = np.linalg.norm(known[elastic] / squares[elastic, None], axis=0)
-    left = np.sqrt(np.einsum("ij,ij->j", block, mass @ block)) > _LEFT * known_part
-    return [found * column_signs(found) for found in krylov(block[:, left], static, mass, count)]
+    retained = np.linalg.norm(components[elastic] / squares[elastic, None], axis=0)
+    independent = np.sqrt(np.einsum("ij,ij->j", block, mass @ block)) > _LEFT * retained
+    return [attachment * column_signs(attachment) for attachment in krylov(block[:, independent], static, mass, count)]

@@ -35,8 +35,8 @@ def deviation_errors(
         statics = Statics(sector, number, factorize)
         for size, error, (squares, coordinates) in zip(SIZES, errors, modes, strict=True):
             waves = np.einsum("j,jcm->mc", around[:, number], coordinates) @ fields
-            own = (size * (part.stiffness @ (fields.T @ coordinates[0]))).T
-            error += statics.residual_energies(statics.own(waves), squares, own) / squares
+            forces = (size * (part.stiffness @ (fields.T @ coordinates[0]))).T
+            error += statics.residual_energies(statics.of_diameter(waves), squares, forces) / squares
     return [float(0.5 * error.max() / (1.0 + min(size, 0.0))) for size, error in zip(SIZES, errors, strict=True)]
 
 

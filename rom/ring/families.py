@@ -33,12 +33,12 @@ class Families:
 
     def frequency_hz(self, diameter: int, number: int) -> float:
         """Return the frequency of a family at a nodal diameter; nan if it has none there."""
-        own = self.squares[(self.diameters == diameter) & (self.numbers == number)]
-        return float(np.sqrt(own[0]) / (2.0 * np.pi)) if len(own) else np.nan
+        squares = self.squares[(self.diameters == diameter) & (self.numbers == number)]
+        return float(np.sqrt(squares[0]) / (2.0 * np.pi)) if len(squares) else np.nan
 
     def of_modes(self, shapes: np.ndarray) -> np.ndarray:
         """Return the families (k,) of shapes (n, k) of modal mass 1; -1: of none of them."""
         energies = (self.momenta @ shapes) ** 2
         count = int(self.numbers.max()) + 1
-        parts = np.array([energies[self.numbers == number].sum(axis=0) for number in range(count)])
-        return np.where(parts.sum(axis=0) > 0.5, np.argmax(parts, axis=0), -1)
+        contributions = np.array([energies[self.numbers == number].sum(axis=0) for number in range(count)])
+        return np.where(contributions.sum(axis=0) > 0.5, np.argmax(contributions, axis=0), -1)

@@ -47,7 +47,7 @@ class Forced:
 
     def at(self, frequencies_hz: np.ndarray) -> np.ndarray:
         """Return complex amplitudes (f, N), m/N."""
-        return self._parts(frequencies_hz, slice(None)) + self.residual
+        return self._contributions(frequencies_hz, slice(None)) + self.residual
 
     def peaks(self, low_hz: float, high_hz: float, modes: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return the largest peak (N,), m/N, of every sector between two frequencies, and where (N,), Hz.
@@ -61,32 +61,32 @@ class Forced:
         grid = np.unique(np.r_[low_hz, high_hz, near[(near > low_hz) & (near < high_hz)]])
         response = self.at(grid)
         sizes = np.abs(response)
-        tops = np.zeros(sizes.shape, bool)
-        tops[1:-1] = (sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:])
+        is_peak = np.zeros(sizes.shape, bool)
+        is_peak[1:-1] = (sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:])
         if modes is not None:
-            own = self._parts(grid, np.isin(self.modes, modes))
-            tops &= np.abs(own) > np.abs(response - own)
+            contribution = self._contributions(grid, np.isin(self.modes, modes))
+            is_peak &= np.abs(contribution) > np.abs(response - contribution)
         # the largest sample may be of a lower peak, but not by much
-        tops &= sizes > _NEAR * np.where(tops, sizes, 0.0).max(axis=0)
-        place, sector = np.nonzero(tops)
-        low, high, every = grid[place - 1], grid[place + 1], np.arange(len(place))
+        is_peak &= sizes > _NEAR * np.where(is_peak, sizes, 0.0).max(axis=0)
+        index, sector = np.nonzero(is_peak)
+        low, high, every = grid[index - 1], grid[index + 1], np.arange(len(index))
         for _ in range(_ROUNDS):  # the amplitude rises and falls once between neighbours of a local maximum
             points = np.linspace(low, high, 5)
-            best = np.clip(np.argmax(self._own(points, sector), axis=0), 1, 3)
+            best = np.clip(np.argmax(self._amplitudes(points, sector), axis=0), 1, 3)
             low, high = points[best - 1, every], points[best + 1, every]
         middle = 0.5 * (low + high)
         largest, where = np.full(sizes.shape[1], np.nan), np.full(sizes.shape[1], np.nan)
-        values = self._own(middle[None], sector)[0]
-        for one in np.argsort(values, kind="stable"):
-            largest[sector[one]], where[sector[one]] = values[one], middle[one]
+        values = self._amplitudes(middle[None], sector)[0]
+        for peak in np.argsort(values, kind="stable"):
+            largest[sector[peak]], where[sector[peak]] = values[peak], middle[peak]
         return largest, where
 
-    def _parts(self, frequencies_hz: np.ndarray, poles: slice | np.ndarray) -> np.ndarray:
+    def _contributions(self, frequencies_hz: np.ndarray, poles: slice | np.ndarray) -> np.ndarray:
         """Return what some poles contribute to the complex amplitudes (f, N)."""
         s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)
         return np.asarray((1.0 / (s[:, None] - self.poles[poles])) @ self.residues[poles])
 
-    def _own(self, points: np.ndarray, sector: np.ndarray) -> np.ndarray:
+    def _amplitudes(self, points: np.ndarray, sector: np.ndarray) -> np.ndarray:
         """Return amplitudes (q, c) at frequencies (q, c), each column of a sector (c,)."""
         terms = self.residues[:, sector] / (2j * np.pi * points[:, None, :] - self.poles[:, None])
         return np.abs(terms.sum(axis=1) + self.residual[sector])
@@ -123,15 +123,17 @@ def forced(
     if ring is None:
         raise RingError("model: no reduced ring; a force that turns around needs the sectors of one")
     sectors = int(ring["sectors"])
-    places = [[place_of(model.interface, sector_label(one, j)) for j in range(sectors)] for one in (label, at or label)]
+    coordinates = [
+        [place_of(model.interface, sector_label(name, j)) for j in range(sectors)] for name in (label, at or label)
+    ]
     phases = _phases(order, sectors)
     squares, shapes = model.natural
     rows = model.selection @ shapes
     residual = np.zeros(sectors, complex)
     if model.residual_flexibility is not None:
-        residual = model.residual_flexibility[np.ix_(places[1], places[0])] @ phases
+        residual = model.residual_flexibility[np.ix_(coordinates[1], coordinates[0])] @ phases
     damping = shapes.T @ model.damping @ shapes
-    return _superposed(squares, damping, rows[places[1]], rows[places[0]].T @ phases, residual)
+    return _superposed(squares, damping, rows[coordinates[1]], rows[coordinates[0]].T @ phases, residual)
 
 
 class Natural(NamedTuple):

@@ -60,11 +60,11 @@ class Ring(Record):
         lengths = {"interface": len(self.interface), "direction": 3, **self._lengths()}
         lengths["column"] = lengths["coordinate"]
         for item in fields(self):
-            name, layout, given = item.name, declared(type(self))[item.name][1], getattr(self, item.name)
-            if isinstance(layout, Array) and name != "interface" and (given is not None or item.default is not None):
+            name, layout, value = item.name, declared(type(self))[item.name][1], getattr(self, item.name)
+            if isinstance(layout, Array) and name != "interface" and (value is not None or item.default is not None):
                 shape = tuple(lengths[dimension] for dimension in layout.dims)
-                found = symmetric(name, given, shape[0]) if layout.dims == SQUARE else shaped(name, given, shape)
-                object.__setattr__(self, name, found)
+                final = symmetric(name, value, shape[0]) if layout.dims == SQUARE else shaped(name, value, shape)
+                object.__setattr__(self, name, final)
         object.__setattr__(self, "directions", unit(self.directions))
         super().__post_init__()
         if not self.interface:

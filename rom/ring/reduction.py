@@ -70,17 +70,17 @@ def reduce_ring(
         "matrices": dict(sector.matrices.provenance), "basis": basis, "estimate": estimate,
         "versions": {"numpy": np.__version__, "scipy": scipy.__version__},
     }  # fmt: skip
-    made: tuple[RingModel | SectorRing, np.ndarray] = (
+    reduced: tuple[RingModel | SectorRing, np.ndarray] = (
         sector_ring(sector, interface, part, waves, factorize, provenance)
         if basis == "sectors"
         else _model(sector, interface, part, waves, by_speed, greatest_speed, provenance)
     )
-    ring, fields = made
+    ring, fields = reduced
     errors = deviation_errors(ring, sector, fields, part, factorize)
-    told = ", ".join(f"{100 * error:.1g} % at {size:+.0%}" for size, error in zip(SIZES, errors, strict=True))
+    listed = ", ".join(f"{100 * error:.1g} % at {size:+.0%}" for size, error in zip(SIZES, errors, strict=True))
     estimate |= {
         "one_sector": [{"stiffness": size, "frequency": error} for size, error in zip(SIZES, errors, strict=True)],
-        "sentence": f"{estimate['sentence']}; of frequencies, if one sector's stiffness changes, {told}",
+        "sentence": f"{estimate['sentence']}; of frequencies, if one sector's stiffness changes, {listed}",
     }
     if basis == "sectors":  # what the waves leave out is in the sectors' own motions
         estimate["deviation"] = 2.0 * errors[0] / SIZES[0] ** 2
@@ -92,15 +92,18 @@ def _model(
     by_speed: Sequence[sparse.csr_array], greatest_speed: float, provenance: dict[str, Any],
 ) -> tuple[RingModel, np.ndarray]:  # fmt: skip
     """Return the reduced ring of the waves of all diameters, natural modes first, and their fields (c, n)."""
-    fields = np.vstack([one.real_fields for one in waves])
-    squares = np.concatenate([np.repeat(one.squares, 1 + one.problem.travels) for one in waves])
-    diameters = np.repeat([one.problem.number for one in waves], [len(one.squares) * (1 + one.problem.travels)
-                                                                  for one in waves])  # fmt: skip
-    lead = np.concatenate([np.arange(len(one.squares)).repeat(1 + one.problem.travels) < one.modes for one in waves])
+    fields = np.vstack([wave.real_fields for wave in waves])
+    squares = np.concatenate([np.repeat(wave.squares, 1 + wave.problem.travels) for wave in waves])
+    diameters = np.repeat(
+        [wave.problem.number for wave in waves], [len(wave.squares) * (1 + wave.problem.travels) for wave in waves]
+    )
+    lead = np.concatenate(
+        [np.arange(len(wave.squares)).repeat(1 + wave.problem.travels) < wave.modes for wave in waves]
+    )
     order = np.lexsort([np.where(lead, squares, 0.0), ~lead])  # stable: pairs stay adjacent
     spinning = []
     for matrix in by_speed:
-        blocks = [_hermitian(one.factor * one.fields.conj() @ (matrix @ one.fields.T), one) for one in waves]
+        blocks = [_hermitian(wave.factor * wave.fields.conj() @ (matrix @ wave.fields.T), wave) for wave in waves]
         spinning.append(linalg.block_diag(*blocks)[np.ix_(order, order)])
     fields, matrices = fields[order], sector.matrices
     translations = matrices.rigid_translations()
@@ -119,9 +122,9 @@ def _model(
     return ring, fields
 
 
-def _hermitian(matrix: np.ndarray, one: DiameterWaves) -> np.ndarray:
+def _hermitian(matrix: np.ndarray, wave: DiameterWaves) -> np.ndarray:
     """Return the real form of a Hermitian matrix (b, b) in the pairs of a diameter's waves."""
-    if not one.problem.travels:
+    if not wave.problem.travels:
         return np.asarray(matrix.real)
     block = np.array([[matrix.real, matrix.imag], [-matrix.imag, matrix.real]])
     return np.asarray(block.transpose(2, 0, 3, 1).reshape(2 * len(matrix), -1))

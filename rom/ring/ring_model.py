@@ -123,15 +123,15 @@ class RingModel(Ring):
         mass, stiffness = self.matrices(Deviations(), speed)
         numbers, squares, momenta, diameters = [], [], [], []
         for diameter in np.unique(self.diameters):
-            own = np.flatnonzero(self.diameters == diameter)
-            count = int(np.count_nonzero(own < self.modes))
-            found, shapes = linalg.eigh(
-                stiffness[np.ix_(own, own)], mass[np.ix_(own, own)], subset_by_index=[0, count - 1]
+            members = np.flatnonzero(self.diameters == diameter)
+            count = int(np.count_nonzero(members < self.modes))
+            eigenvalues, shapes = linalg.eigh(
+                stiffness[np.ix_(members, members)], mass[np.ix_(members, members)], subset_by_index=[0, count - 1]
             )
             paired = 0 < 2 * diameter < self.sectors
             numbers.append(np.arange(count) // (2 if paired else 1))
-            squares.append(found)
-            momenta.append((mass[:, own] @ shapes).T)
+            squares.append(eigenvalues)
+            momenta.append((mass[:, members] @ shapes).T)
             diameters.append(np.full(count, diameter))
         return Families(
             np.concatenate(numbers), np.concatenate(diameters), np.concatenate(squares), np.concatenate(momenta)
@@ -167,8 +167,8 @@ class RingModel(Ring):
     def _base_load(self, deviations: Deviations) -> np.ndarray:
         """Return the load (n, 3) of the whole ring by an acceleration of the base along x, y, z."""
         lighter = deviations.of("mass", self.sectors)[:, None, None]
-        own = self.waves.in_sectors(self.base_load.T) + lighter * self.waves.in_sectors(self.part_load.T)
-        return np.asarray(np.einsum("sai,sba->ib", own, turns(self.axis, self.sectors)))
+        loads = self.waves.in_sectors(self.base_load.T) + lighter * self.waves.in_sectors(self.part_load.T)
+        return np.asarray(np.einsum("sai,sba->ib", loads, turns(self.axis, self.sectors)))
 
     def _turning(self) -> dict[str, Any]:
         """Return the axis of rotation as fields of a ReducedModel; none of a ring that does not rotate."""

@@ -119,7 +119,7 @@ class MistuningStudy(Record):
         for index, order in enumerate(self.orders.tolist()):
             factors, fit = self.amplification[index], self.fit(index)
             worst = int(np.argmax(factors))
-            found = [(probability, *quantile(factors, probability)) for probability in PROBABILITIES]
+            quantiles = [(probability, *quantile(factors, probability)) for probability in PROBABILITIES]
             rows.append({
                 "order": order,
                 "tuned_amplitude": float(self.tuned_amplitude[index]),
@@ -131,7 +131,7 @@ class MistuningStudy(Record):
                 "quantiles": [
                     {"probability": probability, "value": value, "low": low, "high": high,
                      "weibull": None if fit is None else fit.quantile(probability)}
-                    for probability, value, low, high in found
+                    for probability, value, low, high in quantiles
                 ],
                 "weibull": None if fit is None else asdict(fit),
             })  # fmt: skip
@@ -187,7 +187,7 @@ def mistuning_study(
     waves = [-order if speed else order for order in orders]
     natural = natural_of(ring, speed=speed)
     nominal = [_Peak.of(search, natural, wave, label) for wave in waves]
-    bands, first, found = [search.band(natural)], None, []
+    bands, first, amplifications = [search.band(natural)], None, []
     for done, seed in enumerate(numbers):
         if report is not None:
             report(done, len(numbers))
@@ -199,19 +199,19 @@ def mistuning_study(
             raise RingError(f"{error} (seed {seed})") from error
         first = first or (deviations, peaks)
         bands.append(search.band(natural))
-        found.append([_amplified(one, tuned) for one, tuned in zip(peaks, nominal, strict=True)])
+        amplifications.append([_amplified(peak, tuned) for peak, tuned in zip(peaks, nominal, strict=True)])
     assert first is not None
     drawn, peaks = first
-    columns = np.array(found, dtype=float).transpose(2, 1, 0)  # fields of Amplification, orders, draws
+    columns = np.array(amplifications, dtype=float).transpose(2, 1, 0)  # fields of Amplification, orders, draws
     band = np.array([min(low for low, _ in bands), max(high for _, high in bands)])
     frequencies = np.linspace(band[0], band[1], points)
     return MistuningStudy(
         sectors=ring.sectors, label=label, orders=np.array(orders), seeds=np.array(numbers),
-        band_hz=band, tuned_amplitude=np.array([one.amplitude for one in nominal]),
-        tuned_frequency_hz=np.array([one.frequency_hz for one in nominal]),
+        band_hz=band, tuned_amplitude=np.array([peak.amplitude for peak in nominal]),
+        tuned_frequency_hz=np.array([peak.frequency_hz for peak in nominal]),
         amplification=columns[0], worst_sector=columns[1], peak_frequency_hz=columns[2], participation=columns[4],
-        frequencies_hz=frequencies, amplitude=np.abs([one.response.at(frequencies) for one in peaks]),
-        amplitude_tuned=np.abs([one.response.at(frequencies)[:, 0] for one in nominal]),
+        frequencies_hz=frequencies, amplitude=np.abs([peak.response.at(frequencies) for peak in peaks]),
+        amplitude_tuned=np.abs([peak.response.at(frequencies)[:, 0] for peak in nominal]),
         **{name: drawn.of(name, ring.sectors) for name in ("stiffness", "mass", "damping")},
         provenance={"ring": dict(ring.provenance), "speed": speed},
     )  # fmt: skip
@@ -222,34 +222,34 @@ class _Search(NamedTuple):
 
     families: Families
     family: int
-    given: tuple[float, float] | None
+    band_hz: tuple[float, float] | None
 
     def modes(self, natural: Natural | OfModel) -> np.ndarray | None:
         """Return the natural modes of the family; None: all."""
-        if self.given is not None:
+        if self.band_hz is not None:
             return None
-        own = np.flatnonzero(self.families.of_modes(natural.shapes) == self.family)
-        if not len(own):
+        members = np.flatnonzero(self.families.of_modes(natural.shapes) == self.family)
+        if not len(members):
             raise RingError(f"family: deviations leave no mode of family {self.family + 1}; give band_hz")
-        return own
+        return members
 
     def band(self, natural: Natural | OfModel) -> tuple[float, float]:
         """Return the edges of the band, Hz, given or about the modes of the family."""
         modes = self.modes(natural)
         if modes is None:
-            assert self.given is not None
-            return self.given
-        own = np.sqrt(natural.squares[modes]) / (2.0 * np.pi)
-        return float((1.0 - _MARGIN) * own.min()), float((1.0 + _MARGIN) * own.max())
+            assert self.band_hz is not None
+            return self.band_hz
+        frequencies = np.sqrt(natural.squares[modes]) / (2.0 * np.pi)
+        return float((1.0 - _MARGIN) * frequencies.min()), float((1.0 + _MARGIN) * frequencies.max())
 
 
 def _search(ring: RingModel | SectorRing, family: int, band_hz: Sequence[float] | None, speed: float) -> _Search:
     """Return where peaks count. Raises RingError for a family that the ring does not have."""
-    families, kept = ring.tuned_families(speed), ring.modes // ring.sectors
+    families, count = ring.tuned_families(speed), ring.modes // ring.sectors
     if band_hz is not None:
         return _Search(families, 0, (float(band_hz[0]), float(band_hz[1])))
-    if not 0 <= family < kept:
-        raise RingError(f"family: the ring has families 0 to {kept - 1}, not {family}")
+    if not 0 <= family < count:
+        raise RingError(f"family: the ring has families 0 to {count - 1}, not {family}")
     return _Search(families, family, None)
 
 
@@ -270,15 +270,15 @@ class _Peak(NamedTuple):
         response, band = natural.forced(order, label), search.band(natural)
         amplitudes, frequencies = response.peaks(*band, search.modes(natural))
         if np.all(np.isnan(amplitudes)):
-            told, remedy = f"of family {search.family + 1}", "take another family (--family), or"
-            if search.given:
-                told, remedy = f"between {band[0]:.6g} and {band[1]:.6g} Hz", "take another band_hz, or"
+            scope, remedy = f"of family {search.family + 1}", "take another family (--family), or"
+            if search.band_hz:
+                scope, remedy = f"between {band[0]:.6g} and {band[1]:.6g} Hz", "take another band_hz, or"
             raise RingError(
-                f"label: {label!r} has no peak {told} under order {abs(order)}; {remedy} an interface coordinate that "
+                f"label: {label!r} has no peak {scope} under order {abs(order)}; {remedy} an interface coordinate that "
                 "its modes move"
             )
         sector = int(np.nanargmax(amplitudes))
-        if search.given and np.abs(response.at(np.array(band))).max() > amplitudes[sector]:
+        if search.band_hz and np.abs(response.at(np.array(band))).max() > amplitudes[sector]:
             raise RingError(
                 f"band_hz: under order {abs(order)}, the response is larger at an end of the band "
                 "than at any peak in it; take a band whose ends are apart from resonances"

@@ -45,14 +45,14 @@ class Waves:
     @cached_property
     def _travelling(self) -> sparse.csr_array:
         """(n, n) unitary: the coordinates of the travelling waves."""
-        place, second = np.arange(len(self.diameters)), self._second
+        index, second = np.arange(len(self.diameters)), self._second
         first, pair = np.flatnonzero(second == 1), np.flatnonzero(second == 2)
-        rows = np.concatenate([place, pair, first])
-        columns = np.concatenate([place, first, pair])
-        own = np.where(second == 0, 1.0 + 0j, np.where(second == 1, 1.0, -1j) * np.sqrt(0.5))
-        values = np.concatenate([own, np.full(len(pair), 1j), np.full(len(first), 1.0)])
-        values[len(place) :] *= np.sqrt(0.5)
-        return sparse.csr_array((values, (rows, columns)), (len(place),) * 2)
+        rows = np.concatenate([index, pair, first])
+        columns = np.concatenate([index, first, pair])
+        diagonal = np.where(second == 0, 1.0 + 0j, np.where(second == 1, 1.0, -1j) * np.sqrt(0.5))
+        values = np.concatenate([diagonal, np.full(len(pair), 1j), np.full(len(first), 1.0)])
+        values[len(index) :] *= np.sqrt(0.5)
+        return sparse.csr_array((values, (rows, columns)), (len(index),) * 2)
 
     def at_sector(self, rows: np.ndarray, sector: int) -> np.ndarray:
         """Return functionals of the fields of a sector, (k, n), for those of another one: (k, n).
@@ -75,5 +75,5 @@ class Waves:
         """Return the sum over sectors (n, n) of a symmetric matrix of `travelling`, with weights (N,)."""
         transform = np.conj(np.fft.fft(weights))
         steps = (self.wavenumbers[None, :] - self.wavenumbers[:, None]) % self.sectors
-        found = (self._travelling @ (travelling * transform[steps]) @ self._travelling.conj().T).real
-        return np.asarray(0.5 * (found + found.T))
+        matrix = (self._travelling @ (travelling * transform[steps]) @ self._travelling.conj().T).real
+        return np.asarray(0.5 * (matrix + matrix.T))
