@@ -46,16 +46,16 @@ class CheckpointFile:
         try:
             with decoding(path):
                 variables, attributes = load(path, self._kind)
-                found = {name: json.loads(attributes[name]) for name in self._belongs}
+                recorded = {name: json.loads(attributes[name]) for name in self._belongs}
         except StoreError as error:
             raise InputError(
                 f"{path}: a checkpoint that cannot be read ({error}); nothing was done to it: move it away, or delete "
                 "it to start again"
             ) from error
-        for name, (what, data) in self._belongs.items():
-            if found[name] != json.loads(json.dumps(data)):
+        for name, (owner, data) in self._belongs.items():
+            if recorded[name] != json.loads(json.dumps(data)):
                 raise InputError(
-                    f"{path}: the checkpoint of another {what}; nothing was done to it: move it away, or delete it to "
+                    f"{path}: the checkpoint of another {owner}; nothing was done to it: move it away, or delete it to "
                     "start again"
                 )
         return variables, attributes
@@ -91,8 +91,8 @@ class CheckpointFile:
             attributes = belongs | dict(attributes) | {"finished": finished}
             save(self._path, self._kind, variables, attributes, compressed=False)
         except StoreError as error:
-            kept = "what was finished before is in it" if self._path.exists() else "nothing is kept"
-            raise StoreError(f"{error}; {finished}, {kept}; make room and run the same command again") from error
+            remains = "what was finished before is in it" if self._path.exists() else "nothing is kept"
+            raise StoreError(f"{error}; {finished}, {remains}; make room and run the same command again") from error
         self._unsaved = False
         ended = time.perf_counter()
         self._next = ended + SHARE * (ended - started)

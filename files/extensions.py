@@ -61,9 +61,9 @@ class ExtensionPoint(NamedTuple):
 
     def all(self) -> dict[str, Any]:
         """Return our own parts and other packages'. Raises ExtensionError for one that cannot be used."""
-        own = self.own()
-        added = _added(self.kind, self.group, own)
-        return _in_order(own | {name: _load(entry, self.kind, self.attributes) for name, entry in added.items()})
+        ours = self.own()
+        added = _added(self.kind, self.group, ours)
+        return _in_order(ours | {name: _load(entry, self.kind, self.attributes) for name, entry in added.items()})
 
 
 def added_parts(kind: str, group: str) -> dict[str, Any]:
@@ -113,11 +113,11 @@ class Registry(NamedTuple):
             raise ExtensionError(f"{part!r}: there is a {self.kind} named {name} already; name it otherwise")
 
 
-def _added(kind: str, group: str, own: Mapping[str, Any]) -> dict[str, EntryPoint]:
+def _added(kind: str, group: str, ours: Mapping[str, Any]) -> dict[str, EntryPoint]:
     """Return the entry points of a group by name."""
     entries: dict[str, EntryPoint] = {}
     for entry in _entry_points(group, tuple(sys.path)):
-        if entry.name in own or entry.name in entries:
+        if entry.name in ours or entry.name in entries:
             raise ExtensionError(f"{_source(entry)}: there is a {kind} named {entry.name} already; name it otherwise")
         entries[entry.name] = entry
     return entries

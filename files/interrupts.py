@@ -59,11 +59,11 @@ def signals_kept() -> Iterator[None]:
         yield
         return
     libc = ctypes.CDLL(None)
-    kept = {number: ctypes.create_string_buffer(1024) for number in signal.valid_signals()}  # of any sigaction
-    for number, action in kept.items():
+    actions = {number: ctypes.create_string_buffer(1024) for number in signal.valid_signals()}  # of any sigaction
+    for number, action in actions.items():
         libc.sigaction(number, None, action)
     try:
         yield
     finally:
-        for number, action in kept.items():
+        for number, action in actions.items():
             libc.sigaction(number, action, None)

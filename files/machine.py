@@ -36,10 +36,10 @@ def not_loaded(error: ImportError | OSError) -> str | None:
 
 def out_of_memory(error: BaseException | None) -> str | None:
     """Return what the memory has no room for, in the words of an error or of its causes; None for another error."""
-    found = None
+    reason = None
     while error is not None:
         no_memory = isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
         if no_memory or _NO_MEMORY.search(str(error)):
-            found = str(error) or "none left"  # in the end the first cause
+            reason = str(error) or "none left"  # in the end the first cause
         error = error.__cause__ or error.__context__
-    return found
+    return reason

@@ -42,11 +42,11 @@ class OpenRecord:
         schemas = {key: core_schema.typed_dict_field(_schema(types[key])) for key in further if key in types}
         if not schemas:
             return table
-        own = {key: keys[key] for key in schemas}
-        values = SchemaValidator(core_schema.typed_dict_schema(schemas)).validate_python(own)
-        rest = {key: value for key, value in keys.items() if key not in own}
-        rest["added"] = (rest.get("added") or {}) | values
-        return ArgsKwargs(table.args, rest) if called else rest
+        added = {key: keys[key] for key in schemas}
+        values = SchemaValidator(core_schema.typed_dict_schema(schemas)).validate_python(added)
+        fields = {key: value for key, value in keys.items() if key not in added}
+        fields["added"] = (fields.get("added") or {}) | values
+        return ArgsKwargs(table.args, fields) if called else fields
 
     @model_serializer(mode="wrap")
     def _write(self, handler: Any) -> dict[str, Any]:
@@ -55,11 +55,11 @@ class OpenRecord:
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        made = handler(schema)
-        properties = handler.resolve_ref_schema(made)["properties"]
+        json_schema = handler(schema)
+        properties = handler.resolve_ref_schema(json_schema)["properties"]
         del properties["added"]
         properties |= {key: handler(_schema(kind)) for key, kind in cls.keys_added().items()}
-        return made
+        return json_schema
 
 
 def _schema(kind: Any) -> CoreSchema:

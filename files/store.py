@@ -166,9 +166,9 @@ def file_stamp(path: str | os.PathLike[str]) -> int:
     file = Path(path)
     if not file.is_file():
         return 0
-    found = file.stat()
+    status = file.stat()
     # copies and archives keep the time of the content; the time of the change cannot be set
-    return hash((found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns))
+    return hash((status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns))
 
 
 def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
@@ -269,10 +269,10 @@ def dataset(variables: Mapping[str, Variable], attributes: Mapping[str, Any]) ->
     """Return a record as an xarray.Dataset, as its file opens. Raises ModuleNotFoundError without xarray."""
     import xarray
 
-    made = {
+    data_vars = {
         name: (tuple(item.dims), np.asarray(item.values), {"units": item.units}) for name, item in variables.items()
     }
-    return xarray.Dataset(made, attrs=_texts(attributes))
+    return xarray.Dataset(data_vars, attrs=_texts(attributes))
 
 
 def _texts(attributes: Mapping[str, Any]) -> dict[str, Any]:
@@ -294,19 +294,19 @@ def clear_leftovers(path: str | os.PathLike[str]) -> None:
 
 def load(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Read a record: (variables by name as arrays, attributes). Raises StoreError with the file and the reason."""
-    found, variables = _content(path)
-    if found.get("kind") != kind:
-        raise StoreError(f"{path}: holds {found.get('kind') or 'no record of ours'}, expected {kind}")
+    attributes, variables = _content(path)
+    if attributes.get("kind") != kind:
+        raise StoreError(f"{path}: holds {attributes.get('kind') or 'no record of ours'}, expected {kind}")
     values = {name: variable.values for name, variable in variables.items()}
-    return _Fields(path, values), _attributes(path, found)
+    return _Fields(path, values), _attributes(path, attributes)
 
 
 def load_any(path: str | os.PathLike[str]) -> tuple[str, dict[str, Variable], dict[str, Any]]:
     """Read a record of any kind: (kind, variables with dimensions and units, attributes). Raises StoreError."""
-    found, variables = _content(path, dimensions=True)
-    if found.get("kind") is None:
+    attributes, variables = _content(path, dimensions=True)
+    if attributes.get("kind") is None:
         raise StoreError(f"{path}: holds no record of ours")
-    return str(found["kind"]), variables, _attributes(path, found)
+    return str(attributes["kind"]), variables, _attributes(path, attributes)
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
@@ -394,12 +394,12 @@ def _checked(path: str, stamp: int) -> bool:
     return True
 
 
-def _attributes(path: str | os.PathLike[str], found: dict[str, Any]) -> dict[str, Any]:
+def _attributes(path: str | os.PathLike[str], attributes: dict[str, Any]) -> dict[str, Any]:
     with decoding(path):
-        version = int(found.get("schema_version", 0))
+        version = int(attributes.get("schema_version", 0))
     if version > SCHEMA_VERSION:
         raise StoreError(f"{path}: schema version {version} is newer than {SCHEMA_VERSION}; update vanedamp")
-    return _Fields(path, found)
+    return _Fields(path, attributes)
 
 
 def _dimensions(dataset: h5py.Dataset, name: str) -> tuple[str, ...]:
@@ -445,8 +445,8 @@ def _dimension_lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
             raise ValueError(f"{name}: {len(variable.dims)} dimensions named for an array of shape {shape}")
         for dimension, length in zip(variable.dims, shape, strict=True):
             if lengths.setdefault(dimension, length) != length:
-                other = lengths[dimension]
-                raise ValueError(f"{name}: dimension {dimension} has length {length} here and {other} elsewhere")
+                earlier = lengths[dimension]
+                raise ValueError(f"{name}: dimension {dimension} has length {length} here and {earlier} elsewhere")
     return lengths
 
 

@@ -44,8 +44,8 @@ class Variants(Generic[Base]):
                 f"{record!r}: is no {self._kind}: derive a dataclass from {base.__name__}, "
                 f"with a default of `{self._key}`"
             )
-        other = self._records.setdefault(field.default, record)
-        if other is not record:
+        registered = self._records.setdefault(field.default, record)
+        if registered is not record:
             raise ExtensionError(
                 f"{record.__module__}.{record.__qualname__}: there is a {self._kind} named {field.default} already; "
                 "name it otherwise"

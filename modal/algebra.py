@@ -18,9 +18,9 @@ MOVES = 0.01
 
 def symmetric_part(matrix: Matrix) -> Matrix:
     """Return (A + A^T) / 2 of a dense or sparse matrix."""
-    given: Any = matrix
-    part: Matrix = 0.5 * (given + given.T)
-    return part
+    dense: Any = matrix
+    half: Matrix = 0.5 * (dense + dense.T)
+    return half
 
 
 def hermitian_part(matrix: np.ndarray) -> np.ndarray:
@@ -42,10 +42,10 @@ def orthonormal(fields: np.ndarray, mass: Any, known: Sequence[np.ndarray] = ())
     out: j may be zero.
     """
     norms = np.sqrt(np.einsum("ij,ij->j", fields, mass @ fields))
-    rest = orthogonal(fields[:, norms > 0.0] / norms[norms > 0.0], mass, known)
-    values, turns = np.linalg.eigh(rest.T @ (mass @ rest))
-    own = values > _OWN_SHARE
-    return np.asarray(rest @ (turns[:, own] / np.sqrt(values[own])))
+    residual = orthogonal(fields[:, norms > 0.0] / norms[norms > 0.0], mass, known)
+    values, vectors = np.linalg.eigh(residual.T @ (mass @ residual))
+    independent = values > _OWN_SHARE
+    return np.asarray(residual @ (vectors[:, independent] / np.sqrt(values[independent])))
 
 
 def krylov(
@@ -79,8 +79,8 @@ def krylov(
 
 def ritz_values(stiffness: Any, mass: Any, fields: np.ndarray) -> np.ndarray:
     """Return the Ritz values of K x = lambda M x in the span of fields (n, m), ascending, one per dimension of it."""
-    left, singular, _ = np.linalg.svd(fields, full_matrices=False)
-    basis = orthonormal(left[:, singular > 1e-8 * singular[0]], mass)
+    span, singular, _ = np.linalg.svd(fields, full_matrices=False)
+    basis = orthonormal(span[:, singular > 1e-8 * singular[0]], mass)
     return np.linalg.eigvalsh(symmetric_part(basis.T @ (stiffness @ basis)))
 
 

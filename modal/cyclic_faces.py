@@ -34,23 +34,23 @@ def paired(
     """
     first, second = matrices.patch(low), matrices.patch(high)
     size = float(np.ptp(matrices.coordinates, axis=0).max())
-    turn = rotation(axis, 2.0 * math.pi / sectors)
-    places, ends = ((matrices.coordinates - point)[patch.nodes] for patch in (first, second))
-    distances, order = cKDTree(places @ turn.T).query(ends)
+    rotated = rotation(axis, 2.0 * math.pi / sectors)
+    starts, ends = ((matrices.coordinates - point)[patch.nodes] for patch in (first, second))
+    distances, order = cKDTree(starts @ rotated.T).query(ends)
     worst = int(np.argmax(distances))
     fits = distances[worst] <= tolerance * size
-    if not fits or len(order) != len(places) or np.unique(order).size != len(order):
-        low_centre, high_centre = (patch.weights @ at / patch.area for patch, at in ((first, places), (second, ends)))
+    if not fits or len(order) != len(starts) or np.unique(order).size != len(order):
+        low_centre, high_centre = (patch.weights @ at / patch.area for patch, at in ((first, starts), (second, ends)))
         check_angle(low_centre, high_centre, sectors, axis, size)
-        if len(places) != len(ends):
-            raise CyclicError(f"ring.low: {low!r} has {len(places)} nodes, {high!r} {len(ends)}; mesh both faces alike")
+        if len(starts) != len(ends):
+            raise CyclicError(f"ring.low: {low!r} has {len(starts)} nodes, {high!r} {len(ends)}; mesh both faces alike")
         x, y, z = matrices.coordinates[second.nodes[worst]]
         raise CyclicError(
             f"ring.high: faces part at ({x:.6g}, {y:.6g}, {z:.6g}) by {distances[worst]:.3g} m, with up to "
             f"{tolerance * size:.3g} m allowed; mesh both alike, or give a larger tolerance"
         )
     nodes = first.nodes[order]
-    _check_supports(matrices, nodes, second.nodes, turn)
+    _check_supports(matrices, nodes, second.nodes, rotated)
     return nodes, second.nodes, float(distances[worst])
 
 

@@ -55,18 +55,18 @@ def gyroscopic_ring_modes(
     stiffness = rotating.standing.stiffness + rotating.added(speed)
     here = replace(sector, matrices=replace(rotating.standing, stiffness=stiffness))
     wanted = list(sector.diameters if diameters is None else diameters)
-    found: list[Family] = []
+    families: list[Family] = []
     for done, number in enumerate(wanted):
         if report is not None:
             report(done, len(wanted))
         problem, turning = here.at(number), rotating_diameter(sector, rotating, number)
         if problem.travels:
-            found += _waves(here, problem, turning, rotating, speed, count)
+            families += _waves(here, problem, turning, rotating, speed, count)
             continue
         modes = gyroscopic_modes(turning, speed, min(count, problem.matrices.free.size))
         shapes = scaled(here, problem.fields(modes.shapes), False)
-        found.append(Family(number, modes.frequencies_hz, modes.residuals, shapes))
-    return gathered(here, found, dict(here.matrices.provenance) | {"speed": speed})
+        families.append(Family(number, modes.frequencies_hz, modes.residuals, shapes))
+    return gathered(here, families, dict(here.matrices.provenance) | {"speed": speed})
 
 
 def _waves(

@@ -86,21 +86,21 @@ class Deformation:
         was interpolated as a matrix would stretch a slender body where it bends, as it is thousands of times as stiff
         against the one as against the other.
         """
-        rest, half, whole = shapes
-        linear, squared = _quadratic(half - rest, whole - rest)
+        initial, half, whole = shapes
+        linear, squared = _quadratic(half - initial, whole - initial)
         stresses = [self.geometric(shape) for shape in shapes]
         geometric = _quadratic(stresses[1] - stresses[0], stresses[2] - stresses[0])
-        start = self.deformed(rest)
+        start = self.deformed(initial)
         # of an even and an odd polynomial of fourth degree, whose values at 1/2 and 1 say all
         ahead, behind = (
-            [self.deformed(rest + a * linear + a**2 * squared) - start for a in (side * 0.5, side)]
+            [self.deformed(initial + a * linear + a**2 * squared) - start for a in (side * 0.5, side)]
             for side in (1.0, -1.0)
         )
-        half_even, even = (0.5 * (one + other) for one, other in zip(ahead, behind, strict=True))
-        half_odd, odd = (0.5 * (one - other) for one, other in zip(ahead, behind, strict=True))
+        half_even, even = (0.5 * (plus + minus) for plus, minus in zip(ahead, behind, strict=True))
+        half_odd, odd = (0.5 * (plus - minus) for plus, minus in zip(ahead, behind, strict=True))
         first, second = (8.0 * half_odd - odd) / 3.0, (16.0 * half_even - even) / 3.0
-        found = first + geometric[0], second + geometric[1], odd - first, even - second
-        return [sparse.csr_array(matrix) for matrix in found]
+        coefficients = first + geometric[0], second + geometric[1], odd - first, even - second
+        return [sparse.csr_array(matrix) for matrix in coefficients]
 
 
 def _quadratic(half: Any, whole: Any) -> tuple[Any, Any]:
@@ -143,13 +143,13 @@ class Equilibria:
         if softening is not None:
             linear = sparse.csr_array(linear - softening)
         for _ in range(_MOST_STEPS):
-            rest = load - linear @ here - self._deformation.force(here)
-            change = self.solve(rest)
+            residual = load - linear @ here - self._deformation.force(here)
+            change = self.solve(residual)
             step = float(np.abs(change).max())
             if step > _SLOW * before:
                 try:
                     self._factorise(sparse.csr_array(linear + self._deformation.tangent(here)))
-                    change = self.solve(rest)
+                    change = self.solve(residual)
                 except SolverError:
                     return None
                 step = float(np.abs(change).max())
@@ -162,5 +162,5 @@ class Equilibria:
 
     def _factorise(self, stiffness: sparse.csr_array) -> None:
         self._factors.close()
-        given = replace(self._matrices, stiffness=stiffness)
-        self.solve = self._factors.enter_context(self._statics.solver(given))
+        matrices = replace(self._matrices, stiffness=stiffness)
+        self.solve = self._factors.enter_context(self._statics.solver(matrices))

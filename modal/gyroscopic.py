@@ -72,10 +72,10 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     omega, shapes, residuals = _converged(pencil, still.shapes[:, free].T)
     if count < omega.size:
         ceiling, below = _known_count(still.angular_frequencies, speed, count) or _count(pencil, omega, count)
-        found = np.count_nonzero(omega < ceiling)
-        if found != below:
+        counted = np.count_nonzero(omega < ceiling)
+        if counted != below:
             where = f"{ceiling / (2.0 * np.pi):.6g} Hz at {speed:.6g} rad/s"
-            raise SolverError(f"{found} of {below} modes found below {where}; ask for a few more or fewer")
+            raise SolverError(f"{counted} of {below} modes found below {where}; ask for a few more or fewer")
     shapes = shapes[:, :count]
     # the phase at which x^T M x is real and positive
     shapes = np.exp(-0.5j * np.angle(np.einsum("ij,ij->j", shapes, mass @ shapes))) * shapes
@@ -102,10 +102,10 @@ def _converged(pencil: _Pencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarr
         for _ in range(_ROUNDS):
             omega, shapes = _within(pencil, space, count)
             forces = stiffness @ shapes
-            rest = forces + 1j * omega * (coupling @ shapes) - omega**2 * (mass @ shapes)
-            parts = np.hstack([rest.real, rest.imag])
-            corrections = factors.solve(parts)
-            works = np.einsum("ij,ij->j", parts, corrections).reshape(2, -1).sum(axis=0)
+            residual = forces + 1j * omega * (coupling @ shapes) - omega**2 * (mass @ shapes)
+            columns = np.hstack([residual.real, residual.imag])
+            corrections = factors.solve(columns)
+            works = np.einsum("ij,ij->j", columns, corrections).reshape(2, -1).sum(axis=0)
             residuals = np.sqrt(works / np.einsum("ij,ij->j", shapes.conj(), forces).real)
             late = np.tile(residuals > _TOLERANCE, 2)
             if not late.any():
@@ -128,13 +128,13 @@ def dense_modes(stiffness: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray
     frequencies kappa, velocities v and scaled displacements y = kappa x obey the skew system v' + W G v + kappa y = 0,
     y' = kappa v.
     """
-    squares, turn = linalg.eigh(hermitian_part(stiffness))
-    kappa, coupled = np.sqrt(squares), turn.conj().T @ coupling @ turn
+    squares, modes = linalg.eigh(hermitian_part(stiffness))
+    kappa, coupled = np.sqrt(squares), modes.conj().T @ coupling @ modes
     skew = np.block([[0.5 * (coupled - coupled.conj().T), np.diag(kappa)], [-np.diag(kappa), np.zeros_like(coupled)]])
     omega, vectors = linalg.eigh(1j * skew)
     size = len(kappa)
     shapes = vectors[size:, size:] / kappa[:, None]
-    return omega[size:], turn @ (shapes / np.linalg.norm(shapes, axis=0))
+    return omega[size:], modes @ (shapes / np.linalg.norm(shapes, axis=0))
 
 
 def _known_count(still: np.ndarray, speed: float, count: int) -> tuple[float, int] | None:

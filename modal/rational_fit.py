@@ -60,27 +60,27 @@ class Rational:
         least = [max(2 * low - high, 1e-3 * low), np.log(_NARROWEST * spacing / 2)]
         most = [2 * high - low, np.log(high)]
         parameters = np.clip(np.column_stack([start.imag, np.log(-start.real)]), least, most)
-        kept: list[np.ndarray] = [np.empty(0)] * 2
+        latest: list[np.ndarray] = [np.empty(0)] * 2
 
         def error(parameters: np.ndarray) -> np.ndarray:
-            value, kept[1] = self._derived(parameters)
-            kept[0] = parameters.copy()
+            value, latest[1] = self._derived(parameters)
+            latest[0] = parameters.copy()
             return value
 
         def jacobian(parameters: np.ndarray) -> np.ndarray:
-            return kept[1] if np.array_equal(parameters, kept[0]) else self._derived(parameters)[1]
+            return latest[1] if np.array_equal(parameters, latest[0]) else self._derived(parameters)[1]
 
-        found = least_squares(
+        result = least_squares(
             error, parameters.ravel(), jac=jacobian, x_scale="jac",
             bounds=(np.tile(least, start.size), np.tile(most, start.size)), xtol=1e-14, ftol=1e-12, gtol=1e-14,
         )  # fmt: skip
-        return Fit(_unpacked(found.x), float(found.fun @ found.fun), found.jac)
+        return Fit(_unpacked(result.x), float(result.fun @ result.fun), result.jac)
 
     def without_one(self, fit: Fit) -> Fit:
         """Return the best fit with one pole less: each pole left out in turn, and a new set by vector fitting."""
         count = fit.poles.size
         starts = [np.delete(fit.poles, index) for index in range(count)]
-        return min((self.fit(start) for start in [*starts, self.relocated(count - 1)]), key=lambda other: other.misfit)
+        return min((self.fit(start) for start in [*starts, self.relocated(count - 1)]), key=lambda fit: fit.misfit)
 
     def chance(self, fit: Fit) -> float:
         """Bound the probability that noise by itself lets the last pole lower the misfit as much as it does.
@@ -96,8 +96,8 @@ class Rational:
         responses, lines = self.values.shape
         freedom = 2 * responses * lines - responses * (2 * fit.poles.size + 2) - 2 * fit.poles.size
         floor = (_ROUND_OFF * np.linalg.norm(self.values)) ** 2
-        left = (fit.misfit + floor) / (self.without_one(fit).misfit + floor)
-        return float(_TRIALS * lines * special.betainc(max(freedom, 1) / 4, responses, min(left, 1.0)))
+        ratio = (fit.misfit + floor) / (self.without_one(fit).misfit + floor)
+        return float(_TRIALS * lines * special.betainc(max(freedom, 1) / 4, responses, min(ratio, 1.0)))
 
     def solve(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the best fit (k, n) and residues (k, m) for given poles."""
@@ -142,9 +142,9 @@ class Rational:
         functions = _real(self._basis(poles))
         size = np.linalg.norm(functions, axis=0)
         span, values, right = np.linalg.svd(functions / size, full_matrices=False)
-        kept = values > values[0] * functions.shape[0] * np.finfo(float).eps
-        span = span[:, kept]
-        return span, (right[kept].T / size[:, None] / values[kept]) @ (span.T @ self._target)
+        resolved = values > values[0] * functions.shape[0] * np.finfo(float).eps
+        span = span[:, resolved]
+        return span, (right[resolved].T / size[:, None] / values[resolved]) @ (span.T @ self._target)
 
     def _misfit(self, poles: np.ndarray) -> float:
         span = self._projected(poles)[0]
@@ -158,27 +158,27 @@ class Rational:
         count = poles.size
         first = self._weight / (self.s[:, None] - poles) ** 2
         second = self._weight / (self.s[:, None] - poles.conj()) ** 2
-        one, two = coefficients[:count], coefficients[count : 2 * count]
+        real, imaginary = coefficients[:count], coefficients[count : 2 * count]
         plus, minus = first + second, 1j * (first - second)
         columns = np.empty((*self._target.shape, count, 2))
         for index in range(count):
-            moved = minus[:, [index]] * one[index] - plus[:, [index]] * two[index]
-            decayed = poles[index].real * (plus[:, [index]] * one[index] + minus[:, [index]] * two[index])
+            moved = minus[:, [index]] * real[index] - plus[:, [index]] * imaginary[index]
+            decayed = poles[index].real * (plus[:, [index]] * real[index] + minus[:, [index]] * imaginary[index])
             columns[:, :, index, 0], columns[:, :, index, 1] = _real(moved), _real(decayed)
         flat = columns.reshape(len(self._target), -1)
         return error.ravel(), (flat - span @ (span.T @ flat)).reshape(error.size, 2 * count)
 
     def _relocate(self, poles: np.ndarray) -> np.ndarray:
         """Return the zeros of the denominator that makes the fit linear, flipped into the left half plane."""
-        own, common, count = self._basis(poles), self._basis(poles, terms=False), len(poles)
-        width = own.shape[1]
+        basis, common, count = self._basis(poles), self._basis(poles, terms=False), len(poles)
+        width = basis.shape[1]
         values = self.values[:, :, None]
-        shared = np.broadcast_to(own, (len(values), *own.shape))
+        shared = np.broadcast_to(basis, (len(values), *basis.shape))
         rows = np.concatenate([shared, -values * common, values], axis=2)
         # the common denominator fits the rest that the response's own coefficients leave
         triangles = np.asarray(np.linalg.qr(np.concatenate([rows.real, rows.imag], axis=1), mode="r"))
-        rest = triangles[:, width:, width:].reshape(-1, 2 * count + 1)
-        weights = np.linalg.lstsq(rest[:, :-1], rest[:, -1], rcond=None)[0]
+        remainder = triangles[:, width:, width:].reshape(-1, 2 * count + 1)
+        weights = np.linalg.lstsq(remainder[:, :-1], remainder[:, -1], rcond=None)[0]
         rotation = np.diag(np.tile(poles.real, 2))
         at = np.arange(count)
         rotation[at, count + at], rotation[count + at, at] = poles.imag, -poles.imag

@@ -54,8 +54,8 @@ def rigid_model(
     shape, frequency = modes.shapes[mode], modes.angular_frequencies[mode]
     displacement = float(functional @ shape)
     if not _moves(displacement, functional, shape):
-        found = f"mode {mode} ({modes.frequencies_hz[mode]:.5g} Hz)"
-        raise CalibrationError(f"at: {found} does not move {at!r}; name another interface coordinate")
+        described = f"mode {mode} ({modes.frequencies_hz[mode]:.5g} Hz)"
+        raise CalibrationError(f"at: {described} does not move {at!r}; name another interface coordinate")
     if frequency <= 0.0:
         raise CalibrationError(f"mode: mode {mode} is a rigid motion without stiffness; hold the structure")
     mass = 1.0 / displacement**2

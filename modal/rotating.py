@@ -97,18 +97,18 @@ class RotatingMatrices:
         """
         if self.neglected is None:
             return 0.0
-        free, given = self.standing.free, self.standing.of_free
-        mass, near = given(self.standing.mass), given(self.standing.stiffness + self.added(0.5 * self.greatest))
-        exact = sparse.csr_array(near + given(self.neglected))
+        free, of_free = self.standing.free, self.standing.of_free
+        mass, near = of_free(self.standing.mass), of_free(self.standing.stiffness + self.added(0.5 * self.greatest))
+        exact = sparse.csr_array(near + of_free(self.neglected))
         fields = shapes[:, free].T
         with factorize(exact) as factors:
             space = orthonormal(np.hstack([fields, factors.solve(mass @ fields)]), mass)
         count = min(len(shapes), space.shape[1])
-        told, right = (
+        approximate, reference = (
             linalg.eigh(symmetric_part(space.T @ (matrix @ space)), eigvals_only=True)[:count]
             for matrix in (near, exact)
         )
-        return float(np.abs(np.sqrt(np.maximum(told, 0.0) / right) - 1.0).max())
+        return float(np.abs(np.sqrt(np.maximum(approximate, 0.0) / reference) - 1.0).max())
 
 
 def unstable_at(speed: float, limit: float) -> UnstableError:

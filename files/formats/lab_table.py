@@ -55,7 +55,7 @@ class Column(NamedTuple):
     unit: Unit | None
     kind: str
     unknown: str
-    place: int
+    position: int
 
     @property
     def role(self) -> str:
@@ -83,7 +83,7 @@ class LabTable:
 
     def words(self, column: Column) -> list[str]:
         """Return the words (n,) of a column."""
-        return [row[column.place] for row in self.rows]
+        return [row[column.position] for row in self.rows]
 
     def numbers(self, column: Column) -> np.ndarray:
         """Return the numbers (n,) of a column as they stand, complex if one is. Raises the table's error."""
@@ -92,14 +92,16 @@ class LabTable:
             plain = np.array([float(word) for word in words])
             if np.all(np.abs(plain) <= LARGEST) and "_" not in "".join(words):
                 return plain
-        found = [number(word) for word in words]
-        for row, value in enumerate(found):
+        values = [number(word) for word in words]
+        for row, value in enumerate(values):
             if value is None or abs(value) > LARGEST:
-                what = "a finite number" if value is None else f"a number up to {LARGEST:g}"
+                expected = "a finite number" if value is None else f"a number up to {LARGEST:g}"
                 name = f"{column.header}: " if column.header else ""
-                raise self.error(f"{self.place(row)}: {name}expected {what} (got {self.rows[row][column.place]!r})")
-        values = np.array(found, complex)
-        return values if self.is_complex(column) else values.real.copy()
+                raise self.error(
+                    f"{self.place(row)}: {name}expected {expected} (got {self.rows[row][column.position]!r})"
+                )
+        array = np.array(values, complex)
+        return array if self.is_complex(column) else array.real.copy()
 
     def is_complex(self, column: Column) -> bool:
         """Whether a column holds complex numbers."""
@@ -114,12 +116,14 @@ class LabTable:
 
     def unit_of(self, column: Column, quantity: str, default: str = "") -> Unit:
         """Return the unit of a column; arguments as of `si`."""
-        own = column.unit or (unit(default) if not column.unknown else None)
-        if own is not None and own.quantity == quantity and not own.decibels:
-            return own
-        what = f"no unit of {quantity}" if own else f"unknown unit {column.unknown!r}" if column.unknown else "no unit"
+        found = column.unit or (unit(default) if not column.unknown else None)
+        if found is not None and found.quantity == quantity and not found.decibels:
+            return found
+        fault = (
+            f"no unit of {quantity}" if found else f"unknown unit {column.unknown!r}" if column.unknown else "no unit"
+        )
         raise self.error(
-            f"{self.path}: {column.header!r}: {what}; write one such as '{column.name or quantity} "
+            f"{self.path}: {column.header!r}: {fault}; write one such as '{column.name or quantity} "
             f"[{_EXAMPLES[quantity]}]'"
         )
 
@@ -134,26 +138,26 @@ class LabTable:
         )
         if not any(column.header for column in self.columns):
             raise self.error(f"{self.path}: names no columns; expected the header {expected}")
-        known = {*further, *(role for roles in needed for role in roles)}
-        found: dict[str, Column] = {}
+        roles_known = {*further, *(role for roles in needed for role in roles)}
+        by_role: dict[str, Column] = {}
         for column in self.columns:
-            role = column.header if column.header in known else column.role
-            if role not in known:
+            role = column.header if column.header in roles_known else column.role
+            if role not in roles_known:
                 raise self.error(f"{self.path}: unknown column {column.header!r}; expected {expected}")
-            if role in found:
+            if role in by_role:
                 raise self.error(
-                    f"{self.path}: {found[role].header!r} and {column.header!r} are both {role}; leave one out"
+                    f"{self.path}: {by_role[role].header!r} and {column.header!r} are both {role}; leave one out"
                 )
-            found[role] = column
+            by_role[role] = column
         for roles in needed:
-            if not found.keys() & set(roles):
+            if not by_role.keys() & set(roles):
                 raise self.error(f"{self.path}: no column {_title(roles[0])}; expected {expected}")
-        return found
+        return by_role
 
     def reading(self, taken: Mapping[str, str]) -> str:
         """Return how the file was read, in words; taken: what was made of headers."""
-        told = ", ".join(f"{key!r} as {value}" for key, value in taken.items())
-        return f"{Path(self.path).name}: {self._spelling}; {told}"
+        roles = ", ".join(f"{key!r} as {value}" for key, value in taken.items())
+        return f"{Path(self.path).name}: {self._spelling}; {roles}"
 
 
 def _title(role: str) -> str:
@@ -196,13 +200,13 @@ def _table(path: str | os.PathLike[str], error: type[VanedampError], text: str, 
         named = [titles] if len(titles) == width and _column(titles[0], 0).role in ("frequency", "time") else []
     titles = named[-1] if named else [""] * width
     if len(named) > 1 and all(not _column(title, 0).name for title in titles):  # units below names
-        titles = [" ".join(filter(None, each)) for each in zip(*named[-2:], strict=True)]
+        titles = [" ".join(filter(None, pair)) for pair in zip(*named[-2:], strict=True)]
     if not titles[-1] and not any(row[-1] for _, row in body):  # a separator at the end of every line
         titles.pop()
     rows = [row for _, row in body]
     commas = _decimal_commas(path, error, body)
     spelling = f"{_SEPARATORS[separator]}, decimal {'commas' if commas else 'points'}, {encoding}"
-    columns = [_column(title, place) for place, title in enumerate(titles)]
+    columns = [_column(title, index) for index, title in enumerate(titles)]
     return LabTable(path, error, columns, rows, [n for n, _ in body], spelling)
 
 
@@ -252,26 +256,26 @@ def _titles(line: str, separator: str) -> list[str]:
     return re.findall(r"[^\s(\[]\S*(?:\s+[(\[][^)\]]*[)\]]\S*)?", line)
 
 
-def _column(header: str, place: int) -> Column:
+def _column(header: str, index: int) -> Column:
     """Return the column of a header: its unit is the longest end of it that is one."""
     text, kind = header, ""
     for name, pattern in _KINDS.items():
-        if found := re.search(rf"(?<![A-Za-z]){pattern}(?![A-Za-z])", text, re.I):
-            text, kind = f"{text[: found.start()]} {text[found.end() :]}", name
+        if match := re.search(rf"(?<![A-Za-z]){pattern}(?![A-Za-z])", text, re.I):
+            text, kind = f"{text[: match.start()]} {text[match.end() :]}", name
             break
     text = re.sub(r"[\[(]\s*[\])]", "", text).strip(" _,")
-    for cut in [0, *(found.start() for found in re.finditer(r"[\s_/,:(\[]", text))]:
+    for cut in [0, *(match.start() for match in re.finditer(r"[\s_/,:(\[]", text))]:
         end = text[cut:].strip(" ,:")
         tried = [end, end[1:]] if end[:1] in "/" else [end[1:].replace("_", "/")] if end[:1] == "_" else [end]
         if end[:1] == "[" and end[-1:] == "]":
             tried = [end[1:-1].strip(" ,")]
-        for one in tried:
-            if one and (of := unit(one)):
-                return Column(header, text[:cut].strip(" _/,:"), of, kind, "", place)
+        for candidate in tried:
+            if candidate and (of := unit(candidate)):
+                return Column(header, text[:cut].strip(" _/,:"), of, kind, "", index)
     bracket = re.fullmatch(r"(.*?)\s*([\[(])([^\])]*)[\])]", text)
     if bracket and (bracket[2] == "[" or "/" in bracket[3] or _role_alone(bracket[1])):
-        return Column(header, bracket[1], None, kind, bracket[3].strip(), place)
-    return Column(header, text, None, kind, "", place)
+        return Column(header, bracket[1], None, kind, bracket[3].strip(), index)
+    return Column(header, text, None, kind, "", index)
 
 
 def _role_alone(name: str) -> bool:

@@ -50,8 +50,8 @@ def unit(text: str) -> Unit | None:
         if level["of"] is None:
             return Unit(text, "", 1.0, True)
         size = _LEVEL.fullmatch(level["of"])
-        found = unit(size["unit"]) if size else None
-        return found and found._replace(text=text, factor=float(size["size"] or 1.0) * found.factor, decibels=True)  # type: ignore[index]
+        base = unit(size["unit"]) if size else None
+        return base and base._replace(text=text, factor=float(size["size"] or 1.0) * base.factor, decibels=True)  # type: ignore[index]
     plain = text.translate(_RAISED).replace("µ", "u").replace("μ", "u").replace("°", "deg")
     plain = re.sub(r"[·×]", "*", plain).replace("^", "**")
     plain = re.sub(r"(?<=[A-Za-z])(?=-?\d)", "**", plain)

@@ -94,7 +94,7 @@ class Interference(Record, Plotted):
         if self.speeds.size or self.operating is None:
             return self.crossings
         low, high = self.operating
-        found = [
+        crossings = [
             Crossing(mode, float(order), speed, hz)
             for mode, (diameter, hz) in enumerate(
                 zip(self.modes.diameters.tolist(), self.modes.frequencies_hz.tolist(), strict=True)
@@ -102,13 +102,13 @@ class Interference(Record, Plotted):
             for order in self.exciting(diameter)
             if low <= (speed := 2.0 * np.pi * hz / order) <= high and speed > 0.0
         ]
-        return tuple(sorted(found, key=lambda each: (each.speed, each.mode)))
+        return tuple(sorted(crossings, key=lambda crossing: (crossing.speed, crossing.mode)))
 
     @property
     def in_operation(self) -> tuple[Crossing, ...]:
         """The meetings at speeds of operation."""
         operating = self.operating
-        return () if operating is None else tuple(each for each in self.meetings if each.margin(operating) == 0.0)
+        return () if operating is None else tuple(met for met in self.meetings if met.margin(operating) == 0.0)
 
     @property
     def folded_speeds(self) -> list[float]:
@@ -119,8 +119,8 @@ class Interference(Record, Plotted):
         """Return diameters and frequencies (Hz) of the corners of the folded line of a speed, up to `top`."""
         half = 0.5 * self.modes.sectors
         fold = half * speed / (2.0 * np.pi)  # Hz between two corners
-        places = np.append(np.arange(np.ceil(self.top / fold)), self.top / fold)
-        return half * (1.0 - np.abs(places % 2.0 - 1.0)), fold * places
+        folds = np.append(np.arange(np.ceil(self.top / fold)), self.top / fold)
+        return half * (1.0 - np.abs(folds % 2.0 - 1.0)), fold * folds
 
     def derived(self) -> dict[str, Any]:
         """Return speeds, the diameters that orders excite, and where they meet."""
@@ -129,10 +129,10 @@ class Interference(Record, Plotted):
             "speed": self.speed, "operating": operating,
             "excited": {order: self.excited(order) for order in self.orders},
             "meetings": [
-                asdict(each)
-                | {"diameter": int(modes.diameters[each.mode]), "family": int(modes.families[each.mode])}
-                | {"order": int(each.order), "rpm": each.rpm, "margin": operating and each.margin(operating)}
-                for each in self.meetings
+                asdict(met)
+                | {"diameter": int(modes.diameters[met.mode]), "family": int(modes.families[met.mode])}
+                | {"order": int(met.order), "rpm": met.rpm, "margin": operating and met.margin(operating)}
+                for met in self.meetings
             ],
             "campbell": {"rpm": (self.speeds * RPM).tolist(), "frequency_hz": self.over_speed_hz.tolist()},
         }  # fmt: skip

@@ -46,7 +46,7 @@ class RingModes(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         lengths = {
-            len(one) for one in (self.diameters, self.families, self.frequencies_hz, self.residuals, self.shapes)
+            len(array) for array in (self.diameters, self.families, self.frequencies_hz, self.residuals, self.shapes)
         }
         if len(lengths) != 1 or self.shapes.ndim != 2:
             raise CyclicError(f"modes: shapes {self.shapes.shape} do not fit {len(self.diameters)} diameters")
@@ -62,14 +62,14 @@ class RingModes(Record):
     @property
     def table(self) -> np.ndarray:
         """Frequencies (diameters, families), Hz, of the diameters in ascending order; nan where there is none."""
-        known = np.unique(self.diameters)
-        found = np.full((known.size, int(self.families.max()) + 1), np.nan)
-        found[np.searchsorted(known, self.diameters), self.families] = self.frequencies_hz
-        return found
+        diameters = np.unique(self.diameters)
+        frequencies = np.full((diameters.size, int(self.families.max()) + 1), np.nan)
+        frequencies[np.searchsorted(diameters, self.diameters), self.families] = self.frequencies_hz
+        return frequencies
 
     def whole(self, mode: int, phase: float = 0.0) -> np.ndarray:
         """Return the displacements (N, n_nodes, 3) of all sectors in the global axes, at a phase omega t (rad)."""
         steps = np.arange(self.sectors) * self.angle
         turned = np.exp(1j * (phase + self.diameters[mode] * steps))
-        own = (turned[:, None] * self.shapes[mode]).real.reshape(self.sectors, -1, 3)
-        return np.einsum("sij,snj->sni", turns(self.axis, self.sectors), own)
+        displacements = (turned[:, None] * self.shapes[mode]).real.reshape(self.sectors, -1, 3)
+        return np.einsum("sij,snj->sni", turns(self.axis, self.sectors), displacements)

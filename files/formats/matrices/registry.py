@@ -39,14 +39,14 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             warnings.filterwarnings("error", "Premature end-of-file")  # so pyyeti calls a file that is cut short
-            found = _READERS[file.suffix.lower()](str(file))
+            matrices = _READERS[file.suffix.lower()](str(file))
     except MemoryError:
         raise
     except VanedampError as error:
         raise MatrixFileError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from error
     except Exception as error:  # every format has exceptions of its own
         raise MatrixFileError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
-    dense = {name: np.asarray(_dense(matrix)) for name, matrix in found.items()}
+    dense = {name: np.asarray(_dense(matrix)) for name, matrix in matrices.items()}
     dense = {name: matrix for name, matrix in dense.items() if matrix.dtype.kind in "biufc"}
     counts = Counter(name.lower() for name in dense)
     return {name if counts[name.lower()] > 1 else name.lower(): matrix for name, matrix in dense.items()}

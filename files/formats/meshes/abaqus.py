@@ -129,7 +129,7 @@ class _Deck:
     def _kinds(self) -> tuple[dict[str, Any], ...]:
         return self.mesh.node_sets, self.mesh.element_sets, self.mesh.face_sets
 
-    def _given(self, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
+    def _set_of(self, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
         """Return the members so far of a set that is being given.
 
         One of the assembly hides the part's of its name, which the assembly knows as <instance>.<name>.
@@ -144,7 +144,7 @@ class _Deck:
 
     def _add(self, sets: dict[str, list[int]], name: str | None, labels: list[int]) -> None:
         if name:
-            self._given(sets, name).extend(labels)
+            self._set_of(sets, name).extend(labels)
 
     def _section(self, card: _Card) -> None:
         """Note the shells and trusses to which a section gives a stiffness."""
@@ -153,7 +153,7 @@ class _Deck:
             return
         if card.keyword == "SOLID SECTION" and _spelling(mesh.element_sets, named) not in mesh.element_sets:
             return
-        for label in _known(card.head, mesh.element_sets, named):
+        for label in _set_members(card.head, mesh.element_sets, named):
             if KINDS[mesh.elements[label][0]][0] < 3:
                 mesh.stiff[label] = f"*{card.keyword} in line {card.head.number}"
 
@@ -181,21 +181,21 @@ class _Deck:
             points.append([*row[1:4], 0.0, 0.0][:3])
         if not labels:
             return
-        places = self.frame.to_global(frame.to_global(np.array(points)))
-        for (line, _), label, place in zip(card.data, labels, places, strict=True):
-            self.mesh.add_node(line, label, place)
+        points_global = self.frame.to_global(frame.to_global(np.array(points)))
+        for (line, _), label, point in zip(card.data, labels, points_global, strict=True):
+            self.mesh.add_node(line, label, point)
         self._add(self.mesh.node_sets, card.parameters.get("NSET"), labels)
 
     def _element(self, card: _Card) -> None:
-        given = card.parameters.get("TYPE", "").upper()
-        matches = ((pattern.fullmatch(given), kinds) for pattern, kinds in _ELEMENTS)
+        name = card.parameters.get("TYPE", "").upper()
+        matches = ((pattern.fullmatch(name), kinds) for pattern, kinds in _ELEMENTS)
         kind = next((kinds[int(m[1])] for m, kinds in matches if m and int(m[1]) in kinds), "")
         if not kind:
-            raise card.head.error(f"TYPE={given}: expected solids (C3D4, C3D10, C3D8, C3D20), or shells as their skin")
-        width = next(nodes for nodes, own in [*SOLIDS.items(), *SHELLS.items(), *LINES.items()] if own == kind)
+            raise card.head.error(f"TYPE={name}: expected solids (C3D4, C3D10, C3D8, C3D20), or shells as their skin")
+        width = next(nodes for nodes, shape in [*SOLIDS.items(), *SHELLS.items(), *LINES.items()] if shape == kind)
         words = [(line, word) for line, row in card.data for word in row if word]
         if len(words) % (width + 1):
-            raise card.head.error(f"TYPE={given}: expected a label and {width} nodes an element")
+            raise card.head.error(f"TYPE={name}: expected a label and {width} nodes an element")
         labels = []
         for start in range(0, len(words), width + 1):
             line = words[start][0]
@@ -212,7 +212,9 @@ class _Deck:
         if named is None:
             labels = self._members(card, mesh.nodes, mesh.node_sets)
         else:
-            labels = [node for label in _known(card.head, mesh.element_sets, named) for node in mesh.elements[label][1]]
+            labels = [
+                node for label in _set_members(card.head, mesh.element_sets, named) for node in mesh.elements[label][1]
+            ]
         self._add(mesh.node_sets, card.parameters.get("NSET"), labels)
 
     def _element_set(self, card: _Card) -> None:
@@ -229,25 +231,27 @@ class _Deck:
         if kind == "NODE":
             first = [(line, words[:1]) for line, words in card.data]
             labels = self._members(card._replace(data=first), mesh.nodes, mesh.node_sets)
-            given = self._given(mesh.node_sets, name)
-            if given and set(given) != set(labels):
+            node_set = self._set_of(mesh.node_sets, name)
+            if node_set and set(node_set) != set(labels):
                 raise card.head.error(f"NAME={name}: a set of other nodes has this name; give it another")
-            given.extend(labels)
+            node_set.extend(labels)
             return
-        own = self._given(mesh.face_sets, name)
+        faces = self._set_of(mesh.face_sets, name)
         for line, words in card.data:
             if "COMBINE" in card.parameters:
-                own.extend(face for other in filter(None, words) for face in _known(line, mesh.face_sets, other))
+                faces.extend(
+                    face for surface in filter(None, words) for face in _set_members(line, mesh.face_sets, surface)
+                )
                 continue
-            one = card._replace(data=[(line, words[:1])])
-            members = self._members(one, mesh.elements, mesh.element_sets) if words[0] else list(mesh.elements)
+            single = card._replace(data=[(line, words[:1])])
+            members = self._members(single, mesh.elements, mesh.element_sets) if words[0] else list(mesh.elements)
             face = words[1].upper() if len(words) > 1 else ""
-            own.extend([self._face(one, label, face) for label in members] if face else self._free(set(members)))
+            faces.extend([self._face(single, label, face) for label in members] if face else self._free(set(members)))
 
     def _face(self, card: _Card, label: int, face: str) -> tuple[int, ...]:
         """Return the corners of a face of an element: S1, S2 ... of a solid, SPOS or SNEG of a shell."""
         kind, nodes = self.mesh.elements[label]
-        faces = {f"S{number}": places for number, places in enumerate(_FACES.get(kind, []), 1)}
+        faces = {f"S{number}": corners for number, corners in enumerate(_FACES.get(kind, []), 1)}
         if kind in SHELLS.values():
             faces = dict.fromkeys(("SPOS", "SNEG"), tuple(range(KINDS[kind][1])))
         if face not in faces:
@@ -255,7 +259,7 @@ class _Deck:
                 f"NAME={card.parameters['NAME']}: element {label} ({kind}) has no face {face}; it has "
                 f"{', '.join(faces) or 'none'}"
             )
-        return tuple(nodes[place] for place in faces[face])
+        return tuple(nodes[corner] for corner in faces[face])
 
     def _free(self, members: set[int]) -> Iterator[tuple[int, ...]]:
         """Yield the faces of these elements that no other element has."""
@@ -267,7 +271,7 @@ class _Deck:
         counts = Counter(tuple(sorted(face)) for _, face in faces)
         yield from (face for label, face in faces if label in members and counts[tuple(sorted(face))] == 1)
 
-    def _members(self, card: _Card, known: dict[int, Any], sets: dict[str, list[int]]) -> list[int]:
+    def _members(self, card: _Card, entities: dict[int, Any], sets: dict[str, list[int]]) -> list[int]:
         labels: list[int] = []
         for line, words in card.data:
             if "GENERATE" in card.parameters:
@@ -282,11 +286,11 @@ class _Deck:
                 if plain.isdecimal():
                     labels.append(int(plain))
                 elif plain:
-                    labels.extend(_known(line, sets, word))
+                    labels.extend(_set_members(line, sets, word))
         for label in labels:
-            if label not in known and "GENERATE" not in card.parameters:
+            if label not in entities and "GENERATE" not in card.parameters:
                 raise card.head.error(f"names {label}, which is not given before it")
-        return [label for label in labels if label in known]
+        return [label for label in labels if label in entities]
 
     def _system(self, card: _Card) -> None:
         values = [value for _, row in card.numbers()[:2] for value in (row + [0.0] * 6)[: 6 if len(row) > 3 else 3]]
@@ -314,16 +318,16 @@ class _Deck:
             return
         if not self.mesh.nodes:
             raise card.head.error("moves nodes of its own; write them in global coordinates")
-        places = np.array(list(self.mesh.nodes.values())) + (rows[0] + [0.0] * 3)[:3]
+        points = np.array(list(self.mesh.nodes.values())) + (rows[0] + [0.0] * 3)[:3]
         if len(rows) > 1:
             if len(rows[1]) != 7:
                 raise card.head.error("expected two points of the axis and an angle in its second line")
             start, end = np.array(rows[1][:3]), np.array(rows[1][3:6])
             try:
-                places = start + (places - start) @ rotation(end - start, rows[1][6]).T
+                points = start + (points - start) @ rotation(end - start, rows[1][6]).T
             except ValueError as error:
                 raise card.head.error(f"gives no rotation: {error}") from error
-        self.mesh.nodes = dict(zip(self.mesh.nodes, places, strict=True))
+        self.mesh.nodes = dict(zip(self.mesh.nodes, points, strict=True))
 
 
 def read(path: Path) -> LabelledMesh:
@@ -337,16 +341,16 @@ def read(path: Path) -> LabelledMesh:
 
 def _spelling(sets: Mapping[str, object], name: str) -> str:
     """Return the name as it was first written: Abaqus ignores case."""
-    return next((known for known in sets if known.upper() == name.upper()), name)
+    return next((spelled for spelled in sets if spelled.upper() == name.upper()), name)
 
 
-def _known(line: DeckLine, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
+def _set_members(line: DeckLine, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
     """Return the members of a set. Raises MeshError for a set that no line before has given."""
     plain = name.rpartition(".")[2]  # without the name of an instance
-    own = next((spelled for spelled in (_spelling(sets, name), _spelling(sets, plain)) if spelled in sets), None)
-    if own is None:
+    key = next((spelled for spelled in (_spelling(sets, name), _spelling(sets, plain)) if spelled in sets), None)
+    if key is None:
         raise line.error(f"names the set {plain!r}, which is not given before it")
-    return sets[own]
+    return sets[key]
 
 
 def _cards(path: Path) -> Iterator[_Card]:
@@ -372,23 +376,23 @@ def lines(path: Path, including: tuple[Path, ...] = ()) -> Iterator[DeckLine]:
     including: the files that include this one. Raises MeshError with file and line.
     """
     including = (*including, path.resolve())
-    own_lines = iter(deck_lines(path))
-    for line in own_lines:
+    file_lines = iter(deck_lines(path))
+    for line in file_lines:
         text = line.text.strip()
         if not text or text.startswith("**"):
             continue
         while text.startswith("*") and text.endswith(","):
-            more = next(own_lines, None)
+            more = next(file_lines, None)
             text += (more.text.strip() if more else "") or "*"
         keyword, parameters = _keyword(text)
-        name, own = parameters.get("INPUT"), line._replace(text=text)
+        name, keyword_line = parameters.get("INPUT"), line._replace(text=text)
         if keyword != "INCLUDE":
-            yield own
+            yield keyword_line
         elif name is None:
-            raise own.error("*INCLUDE without INPUT; name the file")
+            raise keyword_line.error("*INCLUDE without INPUT; name the file")
         if name is None or keyword not in ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"):
             continue
-        file = own._replace(within=f"*{keyword} INPUT=").named_file(name, including)
+        file = keyword_line._replace(within=f"*{keyword} INPUT=").named_file(name, including)
         for inner in lines(file, including):
             if keyword != "INCLUDE" and inner.text.startswith("*"):
                 raise inner.error(f"a keyword among the data of *{keyword}; name the file by *INCLUDE")

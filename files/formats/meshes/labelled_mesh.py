@@ -98,9 +98,9 @@ class LabelledMesh:
         """Return the coordinates (n, 3) of nodes."""
         return np.array([self.nodes[label] for label in labels]).reshape(-1, 3)
 
-    def add_node(self, line: DeckLine, label: int, place: np.ndarray) -> None:
+    def add_node(self, line: DeckLine, label: int, point: np.ndarray) -> None:
         """Add a node that a line gives. Raises MeshError for one that is given twice, at different places."""
-        if not np.array_equal(self.nodes.setdefault(label, place), place):
+        if not np.array_equal(self.nodes.setdefault(label, point), point):
             raise line.error(f"node {label} is given twice, at different places")
 
     def add_element(self, line: DeckLine, label: int, kind: str, nodes: list[int]) -> None:

@@ -23,7 +23,7 @@ def systems_of(number: int, lines: Iterable[DeckLine], known: Mapping[int, Frame
 
     Raises MeshError with the line, and StopIteration for a dataset that ends within an entry.
     """
-    rows, found = iter(lines), dict[int, Frame]()
+    rows, frames = iter(lines), dict[int, Frame]()
     if number == 2420:
         next(rows), next(rows)  # number and name of the part
     for head in rows:
@@ -39,15 +39,15 @@ def systems_of(number: int, lines: Iterable[DeckLine], known: Mapping[int, Frame
             if not np.allclose(axes @ axes.T, np.eye(3), atol=1e-4):
                 raise head.error(f"coordinate system {label}: its axes are not perpendicular unit vectors")
         else:  # points: the origin, one on the axis x, one in the plane of x and z
-            points = frame_of(more[0], head.error, found | dict(known)).to_global(np.reshape(numbers[:9], (3, 3)))
+            points = frame_of(more[0], head.error, frames | dict(known)).to_global(np.reshape(numbers[:9], (3, 3)))
             origin = points[0]
             try:
                 x, z, negative_y = through(points[1] - origin, points[2] - origin)
             except ValueError as error:
                 raise head.error(f"coordinate system {label}: {error}") from error
             axes = np.array([x, -negative_y, z])
-        found[label] = Frame(origin, axes, _KINDS[kind])
-    return found
+        frames[label] = Frame(origin, axes, _KINDS[kind])
+    return frames
 
 
 def frame_of(label: int, error: Callable[[str], Exception], known: Mapping[int, Frame]) -> Frame:
@@ -59,13 +59,13 @@ def frame_of(label: int, error: Callable[[str], Exception], known: Mapping[int, 
 
 def systems(path: Path) -> dict[int, Frame]:
     """Return the systems of a file that may hold binary datasets. Raises MeshError."""
-    known = dict[int, Frame]()
+    frames = dict[int, Frame]()
     text = path.read_bytes().decode("latin-1")
     for dataset in re.finditer(r"^ {4}-1\s*\n +(2420|18) *\r?\n(.*?)^ {4}-1\s*$", text, re.MULTILINE | re.DOTALL):
         first = text.count("\n", 0, dataset.start(2)) + 1
-        lines = [DeckLine(path, first + place, line) for place, line in enumerate(dataset[2].splitlines())]
+        lines = [DeckLine(path, first + index, line) for index, line in enumerate(dataset[2].splitlines())]
         try:
-            known |= systems_of(int(dataset[1]), lines, known)
+            frames |= systems_of(int(dataset[1]), lines, frames)
         except StopIteration:
             raise lines[-1].error(f"dataset {dataset[1]} ends within an entry; write the file again") from None
-    return known
+    return frames
