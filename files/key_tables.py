@@ -38,7 +38,7 @@ class Key(NamedTuple):
     meaning: str
 
 
-class Table(NamedTuple):
+class KeyTable(NamedTuple):
     """A table of a file.
 
     path: dotted, `excitation.harmonic`; heading: as it stands in the file, `[[excitation.harmonic]]`; variant: the
@@ -60,15 +60,15 @@ class Table(NamedTuple):
         return f"{self.path}.{key}" if self.path else key
 
 
-def tables(schema: Schema) -> Iterator[Table]:
+def tables(schema: Schema) -> Iterator[KeyTable]:
     """Yield the tables of a file in their order, each before those inside it; one that variants share once."""
     top = _keys(schema, schema)
     if top:
-        yield Table("", "Before the first table", "", "", top)
+        yield KeyTable("", "Before the first table", "", "", top)
     yield from dict.fromkeys(_inner(schema, schema, ""))
 
 
-def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator[Table]:
+def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator[KeyTable]:
     for name, node in table.get("properties", {}).items():
         yield from _tables_at(schema, node, f"{path}.{name}" if path else name, node.get("description", ""))
     others = table.get("additionalProperties")
@@ -76,7 +76,7 @@ def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator
         yield from _tables_at(schema, others, f"{path}.{NAME}", text)
 
 
-def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[Table]:
+def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[KeyTable]:
     """Yield the tables that a key stands for: one, the variants of one, or a list's."""
     tables = _own_tables(schema, node)
     brackets = "[[{}]]" if any("items" in option for option in options(schema, node)) else "[{}]"
@@ -88,7 +88,7 @@ def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[T
         if "properties" in table or values is not None:
             free = () if values is None else (_key(schema, NAME, {"description": text} | values, False),)
             said = table.get("description", text) if values is None else ""
-            yield Table(path, heading, "".join(tags.values()), said, _keys(schema, table, tags) + free)
+            yield KeyTable(path, heading, "".join(tags.values()), said, _keys(schema, table, tags) + free)
         yield from _inner(schema, table, path, text)
 
 

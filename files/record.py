@@ -63,7 +63,7 @@ class Array(NamedTuple):
     imaginary: str = "_imaginary"
 
 
-class Rows(NamedTuple):
+class RecordRows(NamedTuple):
     """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `Unit`s.
 
     Those that have defaults are left out where all rows have all of these.
@@ -72,7 +72,7 @@ class Rows(NamedTuple):
     dim: str
 
 
-class Columns(NamedTuple):
+class NamedArrays(NamedTuple):
     """A mapping of arrays by name, a variable each: of a table that knows unit, further dims and dtype of every name.
 
     table: returns it; dims: first dimensions of all of them; prefix: of names in the file; in_json: returns the
@@ -127,7 +127,7 @@ class Paths(NamedTuple):
         return {path: store.frozen(array, array.dtype) for path, array in arrays.items()}
 
 
-class Sparse(NamedTuple):
+class SparseMatrix(NamedTuple):
     """A square sparse matrix, compressed by rows: its entries, "<name>_column" and "<name>_row_start"."""
 
     unit: str
@@ -165,7 +165,7 @@ class Within(NamedTuple):
     json: tuple[str, ...] = ()
 
 
-class Unit(NamedTuple):
+class NumberUnit(NamedTuple):
     """The unit of a number."""
 
     unit: str
@@ -184,9 +184,11 @@ class Coded(NamedTuple):
     decode: Callable[[Any, str], Any]
 
 
-Layout = Array | Columns | Rows | Ragged | Paths | Sparse | Within | Own | Named | Coded | Unit | None
+Layout = (
+    Array | NamedArrays | RecordRows | Ragged | Paths | SparseMatrix | Within | Own | Named | Coded | NumberUnit | None
+)
 #: layouts of what is no attribute
-_VARIABLES = (Columns, Rows, Ragged, Paths, Sparse, Within, Own)
+_VARIABLES = (NamedArrays, RecordRows, Ragged, Paths, SparseMatrix, Within, Own)
 
 
 def empty() -> np.ndarray:
@@ -241,18 +243,18 @@ class Record(Displayed):
                 for suffix, values in _parts(stored, layout.imaginary).items():
                     dims, unit = self.dims(layout.dims), self.unit_in_file(layout.unit)
                     variables[(layout.name or name) + suffix] = store.Variable(values, dims, unit)
-            elif isinstance(layout, Columns):
+            elif isinstance(layout, NamedArrays):
                 for key, values in value.items():
                     entry = layout.table()[key]
                     dims = self.dims((*layout.dims, *entry.dims))
                     variables[layout.prefix + key] = store.Variable(values, dims, entry.unit)
-            elif isinstance(layout, Rows) and (value or name not in optional):
+            elif isinstance(layout, RecordRows) and (value or name not in optional):
                 variables |= _row_variables(value, get_args(kind)[0], layout.dim, self.unit_in_file)
             elif isinstance(layout, Ragged) and (value or name not in optional):
                 variables |= self._ragged_variables(value, get_args(kind)[0], layout)
             elif isinstance(layout, Within):
                 variables |= value.variables() if value is not None else {}
-            elif isinstance(layout, Paths | Sparse):
+            elif isinstance(layout, Paths | SparseMatrix):
                 variables |= layout.written(name, value)
             elif isinstance(layout, Own) and layout.variables and value is not None:
                 variables |= layout.variables(value)
@@ -267,12 +269,12 @@ class Record(Displayed):
         counts = [0] * len(parts)
         for field, (of, layout) in declared(kind).items():
             column = [getattr(part, field) for part in parts]
-            if isinstance(layout, Rows):
+            if isinstance(layout, RecordRows):
                 whose = np.repeat(np.arange(len(parts)), [len(rows) for rows in column])
                 rows = [row for entries in column for row in entries]
                 variables |= _row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
                 variables[f"{prefix}{layout.dim}_{thing}"] = store.Variable(whose, (prefix + layout.dim,))
-            elif isinstance(layout, Columns):
+            elif isinstance(layout, NamedArrays):
                 for name, values in joined(column, counts).items():
                     entry = layout.table()[name]
                     variables[prefix + layout.prefix + name] = store.Variable(
@@ -348,10 +350,10 @@ class Record(Displayed):
             if isinstance(layout, Array) and value is not None:
                 for suffix, values in _parts(np.asarray(value), layout.imaginary).items():
                     data[(layout.json or layout.name or name) + suffix] = values.tolist()
-            elif isinstance(layout, Columns):
+            elif isinstance(layout, NamedArrays):
                 entries = (layout.in_json or layout.table)()
                 data |= {layout.prefix + key: values.tolist() for key, values in value.items() if key in entries}
-            elif isinstance(layout, Rows):
+            elif isinstance(layout, RecordRows):
                 data[name] = [dataclasses.asdict(row) for row in value]
             elif isinstance(layout, Paths):
                 data[name] = {path: values.tolist() for path, values in value.items()}
@@ -398,12 +400,12 @@ class Record(Displayed):
                     fields[field] = source[f"{name}_real"] + 1j * source[name + layout.imaginary]
                 else:
                     fields[field] = tuple(np.asarray(source[name]).tolist()) if _is_tuple(kind) else source[name]
-            elif isinstance(layout, Columns):
+            elif isinstance(layout, NamedArrays):
                 fields[field] = {
                     name: store.frozen(array, entry.dtype)
                     for name, (array, entry) in _arrays_of(values, layout).items()
                 }
-            elif isinstance(layout, Rows):
+            elif isinstance(layout, RecordRows):
                 of = get_args(kind)[0]
                 if field not in optional or f"{layout.dim}_{next(iter(_columns(of)))}" in values:
                     fields[field] = _rows_of(values, of, layout.dim)
@@ -413,7 +415,7 @@ class Record(Displayed):
                 of = (get_args(kind) or (kind,))[0]
                 if field not in optional or next(iter(declared(of))) in values:
                     fields[field] = of.of(values, attributes, path)
-            elif isinstance(layout, Paths | Sparse):
+            elif isinstance(layout, Paths | SparseMatrix):
                 fields[field] = layout.read(field, values, attributes)
             elif isinstance(layout, Own):
                 fields |= {field: layout.read(values)} if layout.read else {}
@@ -436,7 +438,9 @@ def _declared(cls: type) -> dict[str, tuple[Any, Layout]]:
     hints = get_type_hints(cls, include_extras=True)
     for item in dataclasses.fields(cls):
         kind, *notes = get_args(hints[item.name]) if get_origin(hints[item.name]) is Annotated else (hints[item.name],)
-        layout = next((note for note in notes if isinstance(note, (Array, *_VARIABLES, Named, Coded, Unit))), None)
+        layout = next(
+            (note for note in notes if isinstance(note, (Array, *_VARIABLES, Named, Coded, NumberUnit))), None
+        )
         layouts[item.name] = (kind, layout)
     return layouts
 
@@ -454,7 +458,7 @@ def joined(columns: Sequence[Mapping[str, np.ndarray]], counts: Sequence[int]) -
     return arrays
 
 
-def _arrays_of(values: Mapping[str, Any], layout: Columns, prefix: str = "") -> dict[str, tuple[Any, Any]]:
+def _arrays_of(values: Mapping[str, Any], layout: NamedArrays, prefix: str = "") -> dict[str, tuple[Any, Any]]:
     """Return the arrays of a file that a table knows, with their entries in it, by name."""
     entries = {name: (prefix + layout.prefix + name, entry) for name, entry in layout.table().items()}
     return {name: (values[at], entry) for name, (at, entry) in entries.items() if at in values}
@@ -469,7 +473,7 @@ def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any
         name = prefix + _name(field, layout)
         if isinstance(layout, Array) and layout.dtype is complex and f"{name}_real" in values:
             columns[field] = values[f"{name}_real"] + 1j * values[name + layout.imaginary]
-        elif isinstance(layout, Rows) and f"{prefix}{layout.dim}_{thing}" in values:
+        elif isinstance(layout, RecordRows) and f"{prefix}{layout.dim}_{thing}" in values:
             columns[field] = _rows_of(values, get_args(of)[0], prefix + layout.dim)
         elif name in values:
             columns[field] = values[name]
@@ -482,7 +486,7 @@ def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any
 
 def _has_rows(kind: Any, field: str, dim: str) -> bool:
     layout = declared(kind)[field][1]
-    return isinstance(layout, Rows | Columns) or (isinstance(layout, Array) and layout.dims[0] == dim)
+    return isinstance(layout, RecordRows | NamedArrays) or (isinstance(layout, Array) and layout.dims[0] == dim)
 
 
 def _part(
@@ -492,12 +496,12 @@ def _part(
     """Return the fields of one of the parts in a file; rows: the indices of its own."""
     fields = dict[str, Any]()
     for field, (of, layout) in declared(kind).items():
-        if isinstance(layout, Columns):
+        if isinstance(layout, NamedArrays):
             named = _arrays_of(values, layout, ragged.prefix)
             fields[field] = {name: store.frozen(array[rows], entry.dtype) for name, (array, entry) in named.items()}
         elif field not in columns:
             continue
-        elif isinstance(layout, Rows):
+        elif isinstance(layout, RecordRows):
             whose = values[f"{ragged.prefix}{layout.dim}_{ragged.thing}"]
             fields[field] = tuple(columns[field][index] for index in np.flatnonzero(whose == number))
         elif isinstance(layout, Array) and layout.dims[0] == ragged.dim:
@@ -517,7 +521,7 @@ def _column(kind: Any, layout: Layout) -> tuple[Any, str, tuple[str, ...]]:
     if isinstance(layout, Array):
         return layout.dtype, layout.unit, layout.dims
     dtype = object if kind is str else np.int64 if kind is int else kind
-    return dtype, layout.unit if isinstance(layout, Unit) else "1", ()
+    return dtype, layout.unit if isinstance(layout, NumberUnit) else "1", ()
 
 
 def _parts(values: np.ndarray, imaginary: str) -> dict[str, np.ndarray]:

@@ -298,7 +298,7 @@ def load(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[
     if attributes.get("kind") != kind:
         raise StoreError(f"{path}: holds {attributes.get('kind') or 'no record of ours'}, expected {kind}")
     values = {name: variable.values for name, variable in variables.items()}
-    return _Fields(path, values), _attributes(path, attributes)
+    return _RecordFields(path, values), _attributes(path, attributes)
 
 
 def load_any(path: str | os.PathLike[str]) -> tuple[str, dict[str, Variable], dict[str, Any]]:
@@ -399,7 +399,7 @@ def _attributes(path: str | os.PathLike[str], attributes: dict[str, Any]) -> dic
         version = int(attributes.get("schema_version", 0))
     if version > SCHEMA_VERSION:
         raise StoreError(f"{path}: schema version {version} is newer than {SCHEMA_VERSION}; update vanedamp")
-    return _Fields(path, attributes)
+    return _RecordFields(path, attributes)
 
 
 def _dimensions(dataset: h5py.Dataset, name: str) -> tuple[str, ...]:
@@ -412,7 +412,7 @@ def _without_coordinate(dataset: h5py.Dataset) -> bool:
     return bytes(dataset.attrs.get("NAME", b"")).startswith(_NO_COORDINATE.encode())
 
 
-class _Fields(dict[str, Any]):
+class _RecordFields(dict[str, Any]):
     """The fields of a record by name; a missing one raises StoreError with the file."""
 
     def __init__(self, path: str | os.PathLike[str], values: Mapping[str, Any]) -> None:

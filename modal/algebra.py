@@ -130,7 +130,7 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
 
 
-def turns(axis: np.ndarray, sectors: int) -> np.ndarray:
+def sector_rotations(axis: np.ndarray, sectors: int) -> np.ndarray:
     """Return the rotations (N, 3, 3) of the frames of N sectors about an axis (3,)."""
     return np.array([rotation(axis, 2.0 * np.pi * sector / sectors) for sector in range(sectors)])
 

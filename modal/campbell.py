@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.kept_solutions import Keep, not_kept
 from vanedamp.modal.mode_tracking import Tracks
-from vanedamp.modal.records.campbell import RPM, Campbell, Crossing
+from vanedamp.modal.records.campbell import RPM, Campbell, OrderCrossing
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.speed_range import SpeedRange
 
@@ -107,11 +107,11 @@ def neglected_notes(error: float) -> list[str]:
     ]
 
 
-def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[Crossing]:
+def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[OrderCrossing]:
     """Return the crossings of the modes that are kept with engine orders, by their speed."""
     low, high = tracks.speeds[[0, -1]]
     crossings = [
-        Crossing(tracks.number_at(speed, mode), float(order), speed, order * speed / (2.0 * np.pi))
+        OrderCrossing(tracks.number_at(speed, mode), float(order), speed, order * speed / (2.0 * np.pi))
         for order in orders
         for mode, speed in source.meetings(order)
         if mode < source.count and low <= speed <= high

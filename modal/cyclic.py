@@ -42,7 +42,7 @@ def aliased(order: int, sectors: int) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class Spring:
+class SectorSpring:
     """Springs from every sector to the next, between the mean displacements of two patches.
 
     low, high  patches: `high` of a sector and `low` of the next one
@@ -115,7 +115,7 @@ class CyclicSector:
     low: np.ndarray
     high: np.ndarray
     distance: float = 0.0
-    couplings: tuple[Spring, ...] = ()
+    couplings: tuple[SectorSpring, ...] = ()
 
     @property
     def angle(self) -> float:
@@ -266,7 +266,7 @@ def cyclic_sector(
     sectors: int,
     axis: Sequence[float] | np.ndarray = (0.0, 0.0, 1.0),
     point: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
-    couplings: Sequence[Spring] = (),
+    couplings: Sequence[SectorSpring] = (),
     tolerance: float = TOLERANCE,
 ) -> CyclicSector:
     """Return the sector of a ring, the nodes of its faces in pairs.

@@ -16,7 +16,7 @@ from vanedamp.modal.campbell import CampbellError, checked_speeds, neglected_not
 from vanedamp.modal.cyclic import CyclicSector, aliased
 from vanedamp.modal.cyclic_rotation import rotating_diameter
 from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
-from vanedamp.modal.records.campbell import Campbell, Crossing
+from vanedamp.modal.records.campbell import Campbell, OrderCrossing
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.speed_range import SmallMatrices, SpeedRange, meetings, ritz_modes
 
@@ -42,8 +42,8 @@ def ring_campbell(
     wanted = checked_speeds(speeds, orders, count, rotating.standing.free.size, tolerance)
     if any(order != int(order) for order in orders):
         raise CampbellError("orders: expected whole engine orders of a ring")
-    curves: list[_Curve] = []
-    crossings: list[Crossing] = []
+    curves: list[_DiameterCurve] = []
+    crossings: list[OrderCrossing] = []
     errors, solved, neglected = [], set(), 0.0
     for diameter in sector.diameters:
         if report is not None:
@@ -57,10 +57,10 @@ def ring_campbell(
         with source_class(turning, float(wanted[0]), float(wanted[-1]), asked, gyroscopic, keep) as source:
             for sense, frequencies, met in _waves(source, exciting, wanted, count, tolerance):
                 crossings += [
-                    Crossing(len(curves) + family, order, speed, order * speed / (2.0 * np.pi))
+                    OrderCrossing(len(curves) + family, order, speed, order * speed / (2.0 * np.pi))
                     for order, family, speed in met
                 ]
-                curves += [_Curve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
+                curves += [_DiameterCurve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
             errors.append(_errors(source, wanted))
             neglected = max(neglected, source.neglected_error())
             solved |= set(source.solved)
@@ -86,7 +86,7 @@ def ring_campbell(
     )
 
 
-class _Curve(NamedTuple):
+class _DiameterCurve(NamedTuple):
     diameter: int
     family: int
     frequencies: np.ndarray

@@ -8,7 +8,7 @@ import numpy as np
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
-from vanedamp.modal.rational_fit import Fit, Rational
+from vanedamp.modal.rational_fit import PoleFit, Rational
 
 #: powers of i w that a response has over the displacement
 QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}
@@ -165,7 +165,7 @@ def is_in_decibels(frf: Frf, poles: Poles) -> bool:
     return converted.misfit < _DECIBELS * poles.misfit
 
 
-def _deviations(fit: Fit, scale: float) -> np.ndarray:
+def _deviations(fit: PoleFit, scale: float) -> np.ndarray:
     """Return standard deviations (m, 2) of Hz and damping ratio, from the Jacobian; infinite where that is singular."""
     jacobian, poles = fit.jacobian, fit.poles
     size = np.linalg.norm(jacobian, axis=0)

@@ -67,7 +67,7 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     matrices = rotating.at(speed)
     free = matrices.free
     stiffness, mass, gyroscopic = map(matrices.of_free, (matrices.stiffness, matrices.mass, rotating.gyroscopic))
-    pencil = _Pencil(stiffness, mass, sparse.csr_array(speed * gyroscopic))
+    pencil = _GyroscopicPencil(stiffness, mass, sparse.csr_array(speed * gyroscopic))
     still = solve_modes(matrices, max(count, min(count + SPARE, free.size)))
     omega, shapes, residuals = _converged(pencil, still.shapes[:, free].T)
     if count < omega.size:
@@ -86,7 +86,7 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     return GyroscopicModes(speed, omega[:count] / (2.0 * np.pi), full, residuals[:count], whirl)
 
 
-class _Pencil(NamedTuple):
+class _GyroscopicPencil(NamedTuple):
     """K, M and W G of the free DOFs."""
 
     stiffness: sparse.csr_array
@@ -94,7 +94,7 @@ class _Pencil(NamedTuple):
     coupling: sparse.csr_array
 
 
-def _converged(pencil: _Pencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _converged(pencil: _GyroscopicPencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return as many modes as a mass-orthonormal space (n, m) has: frequencies, shapes (n, m) and residuals."""
     stiffness, mass, coupling = pencil
     count = space.shape[1]
@@ -114,7 +114,7 @@ def _converged(pencil: _Pencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarr
     raise SolverError(f"modes with the gyroscopic coupling keep residuals of {residuals.max():.1e}")
 
 
-def _within(pencil: _Pencil, space: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _within(pencil: _GyroscopicPencil, space: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest frequencies (rad/s) and shapes (n, count), x^H M x = 1, within a mass-orthonormal space."""
     small = (space.T @ (matrix @ space) for matrix in (pencil.stiffness, pencil.coupling))
     omega, shapes = dense_modes(*small)
@@ -148,7 +148,7 @@ def _known_count(still: np.ndarray, speed: float, count: int) -> tuple[float, in
     return 0.5 * float(lower[widest] + upper[widest]), int(last[widest])
 
 
-def _count(pencil: _Pencil, omega: np.ndarray, count: int) -> tuple[float, int]:
+def _count(pencil: _GyroscopicPencil, omega: np.ndarray, count: int) -> tuple[float, int]:
     """Return the same from the inertia of Q, in the widest gap of the frequencies found."""
     last = count + int(np.argmax(np.diff(omega[count - 1 :])))
     ceiling = 0.5 * float(omega[last - 1] + omega[last])

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from vanedamp.files import store
 from vanedamp.files.errors import LARGEST, VanedampError
-from vanedamp.files.record import Array, Own, Record, Sparse
+from vanedamp.files.record import Array, Own, Record, SparseMatrix
 from vanedamp.files.sparse_indices import SparseError, within_shape
 
 # assembly adds the same numbers in another order above and below the diagonal
@@ -93,9 +93,9 @@ class SystemMatrices(Record):
     """Unconstrained finite element matrices in displacement DOFs, dof = 3 * node + component, N = 3 * n_nodes."""
 
     KIND: ClassVar[str] = "system-matrices"
-    stiffness: Annotated[sparse.csr_array, Sparse("N/m")]
+    stiffness: Annotated[sparse.csr_array, SparseMatrix("N/m")]
     """(N, N), symmetric"""
-    mass: Annotated[sparse.csr_array, Sparse("kg")]
+    mass: Annotated[sparse.csr_array, SparseMatrix("kg")]
     """(N, N), symmetric"""
     coordinates: Annotated[np.ndarray, Array(("node", "axis"), "m")]
     """of the nodes"""

@@ -21,9 +21,9 @@ import numpy as np
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.foreign import existing, reading
 from vanedamp.files.formats.lab_table import Column, LabTable, lab_table
-from vanedamp.files.formats.lab_units import Unit
+from vanedamp.files.formats.lab_units import LabUnit
 from vanedamp.files.formats.lab_units import unit as lab_unit
-from vanedamp.files.formats.meshes.frames import Frame
+from vanedamp.files.formats.meshes.frames import CoordinateSystem
 from vanedamp.files.formats.meshes.universal_systems import frame_of, systems
 from vanedamp.files.formats.universal_datasets import (
     COMPLEX_MODE,
@@ -145,7 +145,7 @@ class _Response(NamedTuple):
 
     label: str
     values: np.ndarray
-    of: Unit | None
+    of: LabUnit | None
 
 
 def _frf_of_table(table: LabTable, columns: str | None, unit: str | None) -> tuple[np.ndarray, list[_Response], str]:
@@ -238,7 +238,7 @@ def _columns(table: LabTable, columns: str | None, first: Column, second: Column
     return "real-imaginary"
 
 
-def _unit_of(table: LabTable, first: Column, second: Column | None, text: str | None) -> Unit | None:
+def _unit_of(table: LabTable, first: Column, second: Column | None, text: str | None) -> LabUnit | None:
     """Return the unit of a response, by its header or as given."""
     units = {
         column.unit
@@ -352,7 +352,7 @@ def _shapes_of_universal(file: Path) -> MeasuredShapes:
     nodes: dict[int, tuple[np.ndarray, int]] = {}  # coordinates, and the system of the displacements
     frames = systems(file)
 
-    def frame(system: int) -> Frame:
+    def frame(system: int) -> CoordinateSystem:
         return frame_of(system, lambda why: MeasurementError(f"{file}: {why}"), frames)
 
     for dataset in content:
@@ -440,7 +440,7 @@ def _frf_of_universal(file: Path, unit: str | None) -> tuple[np.ndarray, list[_R
     )
 
 
-def _universal_unit(file: Path, dataset: Mapping[str, Any], unit: str | None) -> Unit:
+def _universal_unit(file: Path, dataset: Mapping[str, Any], unit: str | None) -> LabUnit:
     """Return the unit of dataset 58: as given, by the labels of its axes, or by its data type in SI."""
     top, below = (str(dataset.get(f"{axis}_axis_units_lab", "")).strip() for axis in ("ordinate", "orddenom"))
     top, below = (text if re.search(r"[A-Za-z]", text) and text.upper() != "NONE" else "" for text in (top, below))

@@ -26,7 +26,7 @@ _TRIALS = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class PoleFit:
     """Least squares over the poles.
 
     poles     (m,) complex, scaled, in the upper half plane
@@ -47,14 +47,14 @@ class Rational:
     values: np.ndarray
     power: int
 
-    def fit(self, start: np.ndarray) -> Fit:
+    def fit(self, start: np.ndarray) -> PoleFit:
         """Return the fit next to the poles (m,) of a start.
 
         Bounds keep the poles where the lines can resolve them: without them noise pulls a pole onto one line, where its
         decay underflows or overflows and the result depends on the last bit.
         """
         if start.size == 0:
-            return Fit(start, self._misfit(start), np.zeros((self._target.size, 0)))
+            return PoleFit(start, self._misfit(start), np.zeros((self._target.size, 0)))
         low, high = np.abs(self.s[0]), np.abs(self.s[-1])
         spacing = float(np.diff(np.abs(self.s)).min())
         least = [max(2 * low - high, 1e-3 * low), np.log(_NARROWEST * spacing / 2)]
@@ -74,15 +74,15 @@ class Rational:
             error, parameters.ravel(), jac=jacobian, x_scale="jac",
             bounds=(np.tile(least, start.size), np.tile(most, start.size)), xtol=1e-14, ftol=1e-12, gtol=1e-14,
         )  # fmt: skip
-        return Fit(_unpacked(result.x), float(result.fun @ result.fun), result.jac)
+        return PoleFit(_unpacked(result.x), float(result.fun @ result.fun), result.jac)
 
-    def without_one(self, fit: Fit) -> Fit:
+    def without_one(self, fit: PoleFit) -> PoleFit:
         """Return the best fit with one pole less: each pole left out in turn, and a new set by vector fitting."""
         count = fit.poles.size
         starts = [np.delete(fit.poles, index) for index in range(count)]
         return min((self.fit(start) for start in [*starts, self.relocated(count - 1)]), key=lambda fit: fit.misfit)
 
-    def chance(self, fit: Fit) -> float:
+    def chance(self, fit: PoleFit) -> float:
         """Bound the probability that noise by itself lets the last pole lower the misfit as much as it does.
 
         White noise gives a pole at a fixed place the fraction Beta(k, (N - p)/2) of the misfit without it:

@@ -71,7 +71,7 @@ def rigid_model(
 
 
 @dataclass(frozen=True)
-class CavityMotion:
+class ModalCavityMotion:
     """How one mode moves a cavity, as a rigid model of that mode includes it.
 
     along          displacement along the cavity, for unit displacement at the rigid model's interface coordinate
@@ -84,7 +84,7 @@ class CavityMotion:
     rotation: float
 
 
-def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray) -> CavityMotion | None:
+def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray) -> ModalCavityMotion | None:
     """Return how a mode's shape (N,) moves a cavity; None where it does not move along it.
 
     motion: functionals (N, 3) of the motion along, across and of the rotation, or (N, 2) without a rotation;
@@ -94,7 +94,7 @@ def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray)
     if along is None:
         return None
     normal_motion, *rotation = (motion[:, 1:].T @ shape / (motion[:, 0] @ shape)).tolist()
-    return CavityMotion(along, normal_motion, *(rotation or [0.0]))
+    return ModalCavityMotion(along, normal_motion, *(rotation or [0.0]))
 
 
 def motion_along(shape: np.ndarray, along: np.ndarray, functional: np.ndarray) -> float | None:

@@ -20,7 +20,7 @@ _LONGEST, _LOOKS = 6, 300
 
 
 @dataclass(frozen=True)
-class Collision:
+class WallContact:
     """Contact of a body with a wall of the structure.
 
     label      interface coordinate of the wall
@@ -42,7 +42,7 @@ class Pulse(NamedTuple):
     duration: float
 
 
-def pulse(squares: np.ndarray, row: np.ndarray, collision: Collision, frequency_hz: float) -> Pulse:
+def pulse(squares: np.ndarray, row: np.ndarray, collision: WallContact, frequency_hz: float) -> Pulse:
     """Return the pulse at a wall with modes of squared angular frequencies (n,) and mass-normalised functional (n,).
 
     The transform is taken at `frequency_hz`, from the moment of touching; damping of the modes is left out.
@@ -82,7 +82,7 @@ def pulse_spectrum(ratio: np.ndarray | float) -> np.ndarray:
     return np.where(near, math.pi / 4.0, np.abs(np.cos(math.pi * safe / 2.0) / (1.0 - safe**2)))
 
 
-def share_above(squares: np.ndarray, row: np.ndarray, modes: int, collision: Collision) -> float:
+def share_above(squares: np.ndarray, row: np.ndarray, modes: int, collision: WallContact) -> float:
     """Return the fraction of an elastic collision's energy that modes beyond the first `modes` of a wall would take.
 
     A half sine of force at the contact frequency leaves mode j the energy (row_j p S(omega_j))^2 / 2, p the impulse at

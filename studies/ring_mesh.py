@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vanedamp.modal.algebra import rotation, turns
+from vanedamp.modal.algebra import rotation, sector_rotations
 from vanedamp.modal.records.ring_modes import RingModes
 
 #: distance up to which nodes of two sectors are one, over the sector's size
@@ -53,7 +53,10 @@ def whole_ring(modes: RingModes, coordinates: np.ndarray, cells: np.ndarray) -> 
     numbers[:, on_axis] = on_axis
     kept, places = np.unique(numbers, return_inverse=True)
     sector, node = np.divmod(kept, count)
-    points = np.einsum("sij,nj->sni", turns(modes.axis, sectors), coordinates - modes.point)[sector, node] + modes.point
+    points = (
+        np.einsum("sij,nj->sni", sector_rotations(modes.axis, sectors), coordinates - modes.point)[sector, node]
+        + modes.point
+    )
     return WholeRing(sector, node, points, places.reshape(sectors, count)[:, cells].reshape(-1, cells.shape[1]))
 
 

@@ -16,7 +16,7 @@ from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
 from docs._ext.toml_keys import table_node, with_literals
-from vanedamp.files.record import Array, Named, Record, Rows, Sparse, Unit, Within, declared
+from vanedamp.files.record import Array, Named, NumberUnit, Record, RecordRows, SparseMatrix, Within, declared
 from vanedamp.files.reference import unit_in
 from vanedamp.studies import kinds
 
@@ -76,12 +76,12 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
         text = texts.get(one, _EVERYWHERE.get(one, ""))
         if isinstance(layout, Within):
             found += described((get_args(kind) or (kind,))[0])
-        elif isinstance(layout, Rows):
+        elif isinstance(layout, RecordRows):
             found += [
                 row._replace(name=f"{layout.dim}_{row.name}", dims=", ".join(filter(None, (layout.dim, row.dims))))
                 for row in described(get_args(kind)[0])
             ]
-        elif isinstance(layout, Sparse):
+        elif isinstance(layout, SparseMatrix):
             found += [
                 Described(one, f"{one}_entry", layout.unit, f"entries of the matrix {text}"),
                 Described(f"{one}_column", f"{one}_entry", "", "their columns, from 0"),
@@ -92,13 +92,13 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
             own = ", ".join((layout.name or one) + part for part in parts)
             found.append(Described(own, ", ".join(layout.dims), _unit(layout), text))
         else:
-            unit = _unit(layout) if isinstance(layout, Array | Unit) else unit_in(text) or ""
+            unit = _unit(layout) if isinstance(layout, Array | NumberUnit) else unit_in(text) or ""
             name = layout.name if isinstance(layout, Named) else one
             found.append(Described(name, "", unit, text.removesuffix(f"[{unit}]").rstrip()))
     return found
 
 
-def _unit(layout: Array | Unit) -> str:
+def _unit(layout: Array | NumberUnit) -> str:
     return "" if layout.unit == "1" else layout.unit
 
 

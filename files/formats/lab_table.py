@@ -21,7 +21,7 @@ import numpy as np
 
 from vanedamp.files.errors import LARGEST, VanedampError
 from vanedamp.files.foreign import existing, reading
-from vanedamp.files.formats.lab_units import Unit, unit
+from vanedamp.files.formats.lab_units import LabUnit, unit
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
 _REMARK = ("#", "%", "!", "//")
@@ -52,7 +52,7 @@ class Column(NamedTuple):
 
     header: str
     name: str
-    unit: Unit | None
+    unit: LabUnit | None
     kind: str
     unknown: str
     position: int
@@ -114,7 +114,7 @@ class LabTable:
         """
         return np.asarray(self.unit_of(column, quantity, default).factor * self.numbers(column))
 
-    def unit_of(self, column: Column, quantity: str, default: str = "") -> Unit:
+    def unit_of(self, column: Column, quantity: str, default: str = "") -> LabUnit:
         """Return the unit of a column; arguments as of `si`."""
         found = column.unit or (unit(default) if not column.unknown else None)
         if found is not None and found.quantity == quantity and not found.decibels:

@@ -32,7 +32,7 @@ QUANTITIES: dict[tuple[int, ...], str] = {
 }  # fmt: skip
 
 
-class Unit(NamedTuple):
+class LabUnit(NamedTuple):
     """A unit: what it is of, one of QUANTITIES, "" for decibels without a reference; factor: in SI, of a phase in rad,
     of decibels that of their reference."""
 
@@ -43,12 +43,12 @@ class Unit(NamedTuple):
 
 
 @cache
-def unit(text: str) -> Unit | None:
+def unit(text: str) -> LabUnit | None:
     """Return the unit that a text is; None for none of QUANTITIES."""
     text = text.strip()
     if level := _DECIBELS.fullmatch(text):
         if level["of"] is None:
-            return Unit(text, "", 1.0, True)
+            return LabUnit(text, "", 1.0, True)
         size = _LEVEL.fullmatch(level["of"])
         base = unit(size["unit"]) if size else None
         return base and base._replace(text=text, factor=float(size["size"] or 1.0) * base.factor, decibels=True)  # type: ignore[index]
@@ -61,7 +61,7 @@ def unit(text: str) -> Unit | None:
     except (SyntaxError, ValueError, KeyError, RecursionError, MemoryError):
         return None
     quantity = QUANTITIES.get(powers)
-    return quantity and Unit(text, quantity, factor * (2 * math.pi if quantity == "phase" else 1.0))  # type: ignore
+    return quantity and LabUnit(text, quantity, factor * (2 * math.pi if quantity == "phase" else 1.0))  # type: ignore
 
 
 def _product(node: ast.expr) -> tuple[float, tuple[int, ...]]:

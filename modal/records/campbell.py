@@ -9,23 +9,23 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Record, Rows, Unit, empty
+from vanedamp.files.record import Array, NumberUnit, Record, RecordRows, empty
 
 #: 1/min per rad/s
 RPM = 30.0 / np.pi
 
 
 @dataclass(frozen=True)
-class Crossing:
+class OrderCrossing:
     """A natural frequency met by an engine order."""
 
     mode: int
     """counted from 0"""
     order: float
     """periods per revolution"""
-    speed: Annotated[float, Unit("rad/s")]
+    speed: Annotated[float, NumberUnit("rad/s")]
     """where they meet"""
-    frequency_hz: Annotated[float, Unit("Hz")]
+    frequency_hz: Annotated[float, NumberUnit("Hz")]
     """of both"""
 
     @property
@@ -49,11 +49,11 @@ class Approach:
     """mode of lower frequency before it"""
     second: int
     """mode of higher frequency before it"""
-    speed: Annotated[float, Unit("rad/s")]
+    speed: Annotated[float, NumberUnit("rad/s")]
     """where they approach"""
-    frequency_hz: Annotated[float, Unit("Hz")]
+    frequency_hz: Annotated[float, NumberUnit("Hz")]
     """middle of the two"""
-    gap_hz: Annotated[float, Unit("Hz")]
+    gap_hz: Annotated[float, NumberUnit("Hz")]
     """their distance; zero at a crossing"""
     exchange: float
     """MAC of the first one after a veering with the second one before it, the largest over the range: 1 for a full
@@ -86,9 +86,9 @@ class Campbell(Record, Plotted):
     """speeds at which the full structure was solved"""
     orders: Annotated[tuple[float, ...], Array(("engine_order",), name="engine_order", json="orders")]
     """engine orders"""
-    crossings: Annotated[tuple[Crossing, ...], Rows("crossing")]
+    crossings: Annotated[tuple[OrderCrossing, ...], RecordRows("crossing")]
     """with the engine orders, by speed"""
-    approaches: Annotated[tuple[Approach, ...], Rows("approach")]
+    approaches: Annotated[tuple[Approach, ...], RecordRows("approach")]
     """of two modes: veerings and crossings"""
     gyroscopic: bool = False
     """whether the modes have the gyroscopic coupling"""

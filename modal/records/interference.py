@@ -15,9 +15,9 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Named, Record, Rows, Within, empty
+from vanedamp.files.record import Array, Named, Record, RecordRows, Within, empty
 from vanedamp.modal.cyclic import aliased
-from vanedamp.modal.records.campbell import RPM, Crossing
+from vanedamp.modal.records.campbell import RPM, OrderCrossing
 from vanedamp.modal.records.ring_modes import RingModes
 
 
@@ -41,7 +41,7 @@ class Interference(Record, Plotted):
         default_factory=empty
     )
     """frequencies there; nan where a mode is not among those computed"""
-    crossings: Annotated[tuple[Crossing, ...], Rows("crossing")] = ()
+    crossings: Annotated[tuple[OrderCrossing, ...], RecordRows("crossing")] = ()
     """of the orders and the modes of the diagram"""
 
     def __post_init__(self) -> None:
@@ -86,7 +86,7 @@ class Interference(Record, Plotted):
         return list(zip(np.unique(self.modes.diameters).tolist(), self.modes.table.tolist(), strict=True))
 
     @cached_property
-    def meetings(self) -> tuple[Crossing, ...]:
+    def meetings(self) -> tuple[OrderCrossing, ...]:
         """Where an order has the frequency of a mode whose diameter it excites, by speed.
 
         Over the speeds of the Campbell diagram, or of operation without one.
@@ -95,7 +95,7 @@ class Interference(Record, Plotted):
             return self.crossings
         low, high = self.operating
         crossings = [
-            Crossing(mode, float(order), speed, hz)
+            OrderCrossing(mode, float(order), speed, hz)
             for mode, (diameter, hz) in enumerate(
                 zip(self.modes.diameters.tolist(), self.modes.frequencies_hz.tolist(), strict=True)
             )
@@ -105,7 +105,7 @@ class Interference(Record, Plotted):
         return tuple(sorted(crossings, key=lambda crossing: (crossing.speed, crossing.mode)))
 
     @property
-    def in_operation(self) -> tuple[Crossing, ...]:
+    def in_operation(self) -> tuple[OrderCrossing, ...]:
         """The meetings at speeds of operation."""
         operating = self.operating
         return () if operating is None else tuple(met for met in self.meetings if met.margin(operating) == 0.0)

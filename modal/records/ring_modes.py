@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.record import Array, Record
-from vanedamp.modal.algebra import turns
+from vanedamp.modal.algebra import sector_rotations
 from vanedamp.modal.cyclic_faces import CyclicError
 
 
@@ -72,4 +72,4 @@ class RingModes(Record):
         steps = np.arange(self.sectors) * self.angle
         turned = np.exp(1j * (phase + self.diameters[mode] * steps))
         displacements = (turned[:, None] * self.shapes[mode]).real.reshape(self.sectors, -1, 3)
-        return np.einsum("sij,snj->sni", turns(self.axis, self.sectors), displacements)
+        return np.einsum("sij,snj->sni", sector_rotations(self.axis, self.sectors), displacements)

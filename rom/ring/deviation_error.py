@@ -13,7 +13,7 @@ from scipy import linalg
 from vanedamp.modal.cyclic import CyclicSector
 from vanedamp.rom.bases.projection import Factorize
 from vanedamp.rom.ring.deviations import Deviations
-from vanedamp.rom.ring.diameters import Part, Statics
+from vanedamp.rom.ring.diameters import DeviatingPart, DiameterStatics
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 
@@ -22,7 +22,7 @@ SIZES = (-0.3, -0.5, -0.9, 1.0)
 
 
 def deviation_errors(
-    ring: RingModel | SectorRing, sector: CyclicSector, fields: np.ndarray, part: Part, factorize: Factorize
+    ring: RingModel | SectorRing, sector: CyclicSector, fields: np.ndarray, part: DeviatingPart, factorize: Factorize
 ) -> list[float]:
     """Return the largest relative error of the natural frequencies that a ring keeps, for every deviation of SIZES.
 
@@ -32,7 +32,7 @@ def deviation_errors(
     errors = [np.zeros(len(squares)) for squares, _ in modes]
     around = np.fft.fft(np.eye(sector.sectors))  # the waves are its columns
     for number in sector.diameters:
-        statics = Statics(sector, number, factorize)
+        statics = DiameterStatics(sector, number, factorize)
         for size, error, (squares, coordinates) in zip(SIZES, errors, modes, strict=True):
             waves = np.einsum("j,jcm->mc", around[:, number], coordinates) @ fields
             forces = (size * (part.stiffness @ (fields.T @ coordinates[0]))).T

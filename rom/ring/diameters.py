@@ -32,7 +32,7 @@ _POINTS, _REACH = 17, 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class DeviatingPart:
     """What of a sector deviates: stiffness and mass (n, n), sparse, such as those of the blade."""
 
     stiffness: sparse.csr_array
@@ -65,7 +65,7 @@ class Bases(NamedTuple):
 
 
 def ring_waves(
-    sector: CyclicSector, vectors: np.ndarray, families: int, max_frequency: float | None, part: Part,
+    sector: CyclicSector, vectors: np.ndarray, families: int, max_frequency: float | None, part: DeviatingPart,
     by_speed: Sequence[sparse.csr_array], greatest_speed: float, factorize: Factorize,
     report: Callable[[int, int], None] | None,
 ) -> Bases:  # fmt: skip
@@ -97,7 +97,7 @@ def ring_waves(
     })  # fmt: skip
 
 
-def _forces(modes: RingModes, part: Part) -> np.ndarray:
+def _forces(modes: RingModes, part: DeviatingPart) -> np.ndarray:
     """Return real forces (f, n) that span those of deviations in a sector, on modes of unit strain energy.
 
     The strain energy of the static response to K_p z is at most z K_p z, to M_p z at most z M_p z over the lowest
@@ -121,7 +121,7 @@ def _of_diameter(
 
     sectors, modes_at: at standstill, and at the greatest speed, and their modes; vectors (k, n) of the interface.
     """
-    statics = [Statics(sector, number, factorize) for sector in sectors]
+    statics = [DiameterStatics(sector, number, factorize) for sector in sectors]
     first = statics[0]
     lead = first.of_diameter(_shapes(modes_at[0], number))
     lead_squares = _squares(modes_at[0], number)
@@ -153,7 +153,7 @@ def _squares(modes: RingModes, number: int) -> np.ndarray:
     return np.asarray((2.0 * np.pi * modes.frequencies_hz[modes.diameters == number]) ** 2)
 
 
-class Statics:
+class DiameterStatics:
     """Static responses in a nodal diameter, and products of complex fields (p, n) over the ring."""
 
     def __init__(self, sector: CyclicSector, number: int, factorize: Factorize) -> None:

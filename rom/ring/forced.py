@@ -30,7 +30,7 @@ _NEAR = 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class Forced:
+class OrderResponse:
     """Response of N sectors over the frequency.
 
     poles (p,) rad/s; residues (p, N); residual (N,) m: per force F of 1 N; modes (p,): the natural mode of each pole.
@@ -112,7 +112,7 @@ def forced_response(
 def forced(
     model: RingModel | SectorRing | ReducedModel, order: int, label: str, at: str | None = None,
     deviations: Deviations | None = None, speed: float = 0.0,
-) -> Forced:  # fmt: skip
+) -> OrderResponse:  # fmt: skip
     """Return the response to an engine order over all frequencies. Arguments and errors: see `forced_response`.
 
     speed: of a reduced ring that rotates, rad/s.
@@ -144,7 +144,7 @@ class Natural(NamedTuple):
     shapes: np.ndarray
     damping: np.ndarray
 
-    def forced(self, order: int, label: str, at: str | None = None) -> Forced:
+    def forced(self, order: int, label: str, at: str | None = None) -> OrderResponse:
         """Return the response to an engine order. Raises RingError for an unknown label."""
         ring = self.ring
         load = self.shapes.T @ load_of(ring, order, label)
@@ -163,7 +163,7 @@ class OfModel(NamedTuple):
         """(n,) squared angular frequencies."""
         return self.model.squares
 
-    def forced(self, order: int, label: str, at: str | None = None) -> Forced:
+    def forced(self, order: int, label: str, at: str | None = None) -> OrderResponse:
         """Return the response to an engine order. Raises RingError for an unknown label."""
         return forced(self.model, order, label, at)
 
@@ -191,7 +191,7 @@ def natural_of(
 
 def _superposed(
     squares: np.ndarray, damping: np.ndarray, rows: np.ndarray, load: np.ndarray, residual: np.ndarray
-) -> Forced:
+) -> OrderResponse:
     """Return the response rows @ q of modes (m,) with modal damping (m, m) to modal loads (m,)."""
     count = len(squares)
     diagonal = np.diag(damping)
@@ -199,12 +199,12 @@ def _superposed(
         root = np.sqrt(0.25 * diagonal**2 - squares + 0j)
         poles = np.concatenate([-0.5 * diagonal + root, -0.5 * diagonal - root])
         shares = np.concatenate([load / (2.0 * root), -load / (2.0 * root)])
-        return Forced(poles, np.tile(rows.T, (2, 1)) * shares[:, None], residual, np.tile(np.arange(count), 2))
+        return OrderResponse(poles, np.tile(rows.T, (2, 1)) * shares[:, None], residual, np.tile(np.arange(count), 2))
     first = np.block([[np.zeros((count, count)), np.eye(count)], [-np.diag(squares), -damping]])
     poles, vectors = linalg.eig(first)
     shares = np.linalg.solve(vectors, np.concatenate([np.zeros(count), load]))
     modes = np.argmax(np.abs(vectors[:count]), axis=0)
-    return Forced(poles, (rows @ vectors[:count]).T * shares[:, None], residual, modes)
+    return OrderResponse(poles, (rows @ vectors[:count]).T * shares[:, None], residual, modes)
 
 
 def load_of(ring: RingModel, order: int, label: str) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from vanedamp.files.record import Array, Record, declared
-from vanedamp.modal.algebra import symmetric_part, turns
+from vanedamp.modal.algebra import sector_rotations, symmetric_part
 from vanedamp.rom.checks import shaped, symmetric, unit
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.rom.ring.deviations import RingError
@@ -21,7 +21,7 @@ _Vectors = Annotated[np.ndarray, Array(("interface", "direction"))]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ring(Record):
+class ReducedRing(Record):
     """What reduced rings share: N sectors about an axis; sector j is sector 0 turned by 2 pi j / N."""
 
     sectors: int
@@ -112,7 +112,7 @@ class Ring(Record):
 
     def placed(self) -> dict[str, Any]:
         """Return labels, places and provenance of the whole ring, as fields of a ReducedModel."""
-        rotations = turns(self.axis, self.sectors)
+        rotations = sector_rotations(self.axis, self.sectors)
 
         def turned(vectors: np.ndarray) -> np.ndarray:
             return np.einsum("sij,kj->ski", rotations, vectors).reshape(-1, 3)

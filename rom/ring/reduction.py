@@ -15,7 +15,7 @@ from vanedamp.rom.bases.projection import Factorize, superlu
 from vanedamp.rom.interface import Interface, InterfaceCoordinate
 from vanedamp.rom.ring.deviation_error import SIZES, deviation_errors
 from vanedamp.rom.ring.deviations import RingError
-from vanedamp.rom.ring.diameters import DiameterWaves, Part, ring_waves
+from vanedamp.rom.ring.diameters import DeviatingPart, DiameterWaves, ring_waves
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_basis import sector_ring
 from vanedamp.rom.ring.sector_ring import SectorRing
@@ -29,7 +29,7 @@ def reduce_ring(
     interface: Interface | Sequence[InterfaceCoordinate],
     families: int = 3,
     max_frequency: float | None = None,
-    part: Part | None = None,
+    part: DeviatingPart | None = None,
     centrifugal: sparse.csr_array | None = None,
     greatest_speed: float = 0.0,
     factorize: Factorize = superlu,
@@ -62,7 +62,7 @@ def reduce_ring(
     if any(item.kind not in ("average", "node") for item in interface.coordinates):
         raise RingError('interface: patches of a ring are of kind "average" or "node"')
     by_speed = () if centrifugal is None else (centrifugal, *higher)
-    part = part or Part(sector.matrices.stiffness, sector.matrices.mass)
+    part = part or DeviatingPart(sector.matrices.stiffness, sector.matrices.mass)
     waves, estimate = ring_waves(
         sector, interface.vectors.T, families, max_frequency, part, by_speed, greatest_speed, factorize, report
     )
@@ -88,7 +88,7 @@ def reduce_ring(
 
 
 def _model(
-    sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves],
+    sector: CyclicSector, interface: Interface, part: DeviatingPart, waves: Sequence[DiameterWaves],
     by_speed: Sequence[sparse.csr_array], greatest_speed: float, provenance: dict[str, Any],
 ) -> tuple[RingModel, np.ndarray]:  # fmt: skip
     """Return the reduced ring of the waves of all diameters, natural modes first, and their fields (c, n)."""

@@ -10,17 +10,17 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files.record import Array
-from vanedamp.modal.algebra import added_by_speed, symmetric_part, turns
+from vanedamp.modal.algebra import added_by_speed, sector_rotations, symmetric_part
 from vanedamp.rom.dense_modes import modal_damping
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.families import Families
-from vanedamp.rom.ring.placement import SQUARE, Ring
+from vanedamp.rom.ring.placement import SQUARE, ReducedRing
 from vanedamp.rom.ring.waves import Waves
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RingModel(Ring):
+class RingModel(ReducedRing):
     """A reduced ring of N equal sectors: n real waves of modal mass 1, and one sector's fields in them.
 
     The first `modes` waves are natural modes of the tuned ring at standstill, whole pairs, which `reduce_ring` sorts by
@@ -168,7 +168,7 @@ class RingModel(Ring):
         """Return the load (n, 3) of the whole ring by an acceleration of the base along x, y, z."""
         lighter = deviations.of("mass", self.sectors)[:, None, None]
         loads = self.waves.in_sectors(self.base_load.T) + lighter * self.waves.in_sectors(self.part_load.T)
-        return np.asarray(np.einsum("sai,sba->ib", loads, turns(self.axis, self.sectors)))
+        return np.asarray(np.einsum("sai,sba->ib", loads, sector_rotations(self.axis, self.sectors)))
 
     def _turning(self) -> dict[str, Any]:
         """Return the axis of rotation as fields of a ReducedModel; none of a ring that does not rotate."""

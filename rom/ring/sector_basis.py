@@ -18,7 +18,7 @@ from vanedamp.modal.cyclic import CyclicSector
 from vanedamp.rom.bases.projection import Factorize, lowest_modes
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.ring.deviations import RingError
-from vanedamp.rom.ring.diameters import DiameterWaves, Part
+from vanedamp.rom.ring.diameters import DeviatingPart, DiameterWaves
 from vanedamp.rom.ring.sector_ring import SectorRing
 
 # fraction of the strain energy of the waves that motions of a sector may leave out
@@ -28,8 +28,8 @@ _SIZES = (-0.9, -0.5, 1.0)
 
 
 def sector_ring(
-    sector: CyclicSector, interface: Interface, part: Part, waves: Sequence[DiameterWaves], factorize: Factorize,
-    provenance: dict[str, Any],
+    sector: CyclicSector, interface: Interface, part: DeviatingPart, waves: Sequence[DiameterWaves],
+    factorize: Factorize, provenance: dict[str, Any],
 ) -> tuple[SectorRing, np.ndarray]:  # fmt: skip
     """Return the ring of component modes, and their fields (s, n). Raises RingError for nodes on the axis."""
     if np.any(sector.low == sector.high):
@@ -61,7 +61,7 @@ def sector_ring(
 
 
 def _component_modes(
-    sector: CyclicSector, part: Part, waves: Sequence[DiameterWaves], factorize: Factorize
+    sector: CyclicSector, part: DeviatingPart, waves: Sequence[DiameterWaves], factorize: Factorize
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Return motions (f, n) of the low face, the same of the high face, and inner motions (i, n)."""
     stiffness = sector.matrices.stiffness
@@ -95,7 +95,7 @@ def _component_modes(
 
 
 def _fixed_modes(
-    sector: CyclicSector, part: Part, size: float, inside: np.ndarray, count: int, factorize: Factorize
+    sector: CyclicSector, part: DeviatingPart, size: float, inside: np.ndarray, count: int, factorize: Factorize
 ) -> np.ndarray:
     """Return the lowest modes (m, n) of a sector that deviates, its faces at rest, of unit strain energy."""
     stiffness, mass = (

@@ -12,12 +12,12 @@ from scipy import linalg, sparse
 
 from vanedamp.files import store
 from vanedamp.files.record import Array
-from vanedamp.modal.algebra import symmetric_part, turns
+from vanedamp.modal.algebra import sector_rotations, symmetric_part
 from vanedamp.rom.bases.projection import lowest_modes, superlu
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.families import Families
-from vanedamp.rom.ring.placement import SQUARE, Ring
+from vanedamp.rom.ring.placement import SQUARE, ReducedRing
 from vanedamp.rom.ring.ring_model import RingModel
 
 _Stiffness = Annotated[np.ndarray, Array(SQUARE, "N/m")]
@@ -26,7 +26,7 @@ _Stretch = Annotated[np.ndarray, Array(("spring", "coordinate"))]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SectorRing(Ring):
+class SectorRing(ReducedRing):
     """A ring of N equal sectors by component modes of one; matrices of the whole ring are sparse.
 
     The s coordinates of a sector are f motions of its face low, the same f of its face high, which are the next
@@ -182,7 +182,7 @@ class SectorRing(Ring):
     def _load(self, lighter: np.ndarray) -> np.ndarray:
         """Return the load (size, 3) of the ring by an acceleration of the base along x, y, z."""
         sector_loads = self.base_load + lighter[:, None, None] * self.part_load
-        turned = np.einsum("nsa,nba->nsb", sector_loads, turns(self.axis, self.sectors))
+        turned = np.einsum("nsa,nba->nsb", sector_loads, sector_rotations(self.axis, self.sectors))
         load = np.zeros((self.size, 3))
         np.add.at(load, self.places(), turned)
         return load

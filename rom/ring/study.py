@@ -12,7 +12,7 @@ from vanedamp.files.record import Array, Record
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.extremes import Weibull, quantile, weibull
 from vanedamp.rom.ring.families import Families
-from vanedamp.rom.ring.forced import Forced, Natural, OfModel, natural_of, participation
+from vanedamp.rom.ring.forced import Natural, OfModel, OrderResponse, natural_of, participation
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.rom.ring.whitehead import whitehead_bound
@@ -40,7 +40,7 @@ class Amplification(NamedTuple):
     participation: float
 
 
-class Table(Protocol):
+class DeviationTable(Protocol):
     """What draws deviations: a scene's or a case's table [mistuning], a dataclass."""
 
     @property
@@ -156,7 +156,7 @@ def amplification(
 
 def mistuning_study(
     ring: RingModel | SectorRing,
-    table: Table,
+    table: DeviationTable,
     orders: Sequence[int],
     seeds: int | Sequence[int],
     label: str | None = None,
@@ -191,7 +191,7 @@ def mistuning_study(
     for done, seed in enumerate(numbers):
         if report is not None:
             report(done, len(numbers))
-        deviations = cast("Table", replace(cast("Any", table), seed=seed)).deviations(ring.sectors)
+        deviations = cast("DeviationTable", replace(cast("Any", table), seed=seed)).deviations(ring.sectors)
         natural = natural_of(ring, deviations, speed)
         try:
             peaks = [_Peak.of(search, natural, wave, label) for wave in waves]
@@ -217,7 +217,7 @@ def mistuning_study(
     )  # fmt: skip
 
 
-class _Search(NamedTuple):
+class _PeakScope(NamedTuple):
     """Where peaks count: at the modes of a family, wherever a draw has them, or in a band, Hz, that is given."""
 
     families: Families
@@ -243,26 +243,26 @@ class _Search(NamedTuple):
         return float((1.0 - _MARGIN) * frequencies.min()), float((1.0 + _MARGIN) * frequencies.max())
 
 
-def _search(ring: RingModel | SectorRing, family: int, band_hz: Sequence[float] | None, speed: float) -> _Search:
+def _search(ring: RingModel | SectorRing, family: int, band_hz: Sequence[float] | None, speed: float) -> _PeakScope:
     """Return where peaks count. Raises RingError for a family that the ring does not have."""
     families, count = ring.tuned_families(speed), ring.modes // ring.sectors
     if band_hz is not None:
-        return _Search(families, 0, (float(band_hz[0]), float(band_hz[1])))
+        return _PeakScope(families, 0, (float(band_hz[0]), float(band_hz[1])))
     if not 0 <= family < count:
         raise RingError(f"family: the ring has families 0 to {count - 1}, not {family}")
-    return _Search(families, family, None)
+    return _PeakScope(families, family, None)
 
 
 class _Peak(NamedTuple):
     """The largest peak of a ring's response to an engine order."""
 
-    response: Forced
+    response: OrderResponse
     amplitude: float
     sector: int
     frequency_hz: float
 
     @classmethod
-    def of(cls, search: _Search, natural: Natural | OfModel, order: int, label: str) -> _Peak:
+    def of(cls, search: _PeakScope, natural: Natural | OfModel, order: int, label: str) -> _Peak:
         """Return the largest peak where peaks count.
 
         Raises RingError where there is none, or where a band cuts what is larger.

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from vanedamp.files.formats.meshes.frames import Frame, rotation, through
+from vanedamp.files.formats.meshes.frames import CoordinateSystem, rotation, through
 from vanedamp.files.formats.meshes.labelled_mesh import (
     KINDS,
     LINES,
@@ -61,7 +61,7 @@ _REFUSED = {
 _SECTIONS = ("SHELL SECTION", "SHELL GENERAL SECTION", "MEMBRANE SECTION", "SOLID SECTION", "SURFACE SECTION")
 
 
-class _Card(NamedTuple):
+class _Keyword(NamedTuple):
     """A keyword line with its data: (line, words)."""
 
     head: DeckLine
@@ -91,13 +91,13 @@ class _Deck:
     """
 
     mesh: LabelledMesh = field(default_factory=LabelledMesh)
-    opened: list[_Card] = field(default_factory=list)
+    opened: list[_Keyword] = field(default_factory=list)
     meshed: str | None = None
     instance: str = ""
     of_part: dict[int, set[str]] = field(default_factory=dict)
-    frame: Frame = field(default_factory=Frame)
+    frame: CoordinateSystem = field(default_factory=CoordinateSystem)
 
-    def read(self, card: _Card) -> None:
+    def read(self, card: _Keyword) -> None:
         """Take in one keyword with its data."""
         keyword = card.keyword
         card.head.refuse(f"*{keyword}", _REFUSED)
@@ -106,9 +106,9 @@ class _Deck:
             self.of_part = {id(sets): set(sets) for sets in self._kinds()}
         if begun in _SCOPES:
             self.opened.append(card)
-            self.frame = Frame()
+            self.frame = CoordinateSystem()
         elif ended in _SCOPES:
-            self.frame = Frame()
+            self.frame = CoordinateSystem()
             if not self.opened or self.opened.pop().keyword != ended:
                 raise card.head.error(f"closes no *{ended}")
         if keyword in ("NODE", "ELEMENT"):
@@ -146,7 +146,7 @@ class _Deck:
         if name:
             self._set_of(sets, name).extend(labels)
 
-    def _section(self, card: _Card) -> None:
+    def _section(self, card: _Keyword) -> None:
         """Note the shells and trusses to which a section gives a stiffness."""
         named, mesh = card.parameters.get("ELSET"), self.mesh
         if named is None or (card.keyword == "SURFACE SECTION" and "DENSITY" not in card.parameters):
@@ -157,22 +157,22 @@ class _Deck:
             if KINDS[mesh.elements[label][0]][0] < 3:
                 mesh.stiff[label] = f"*{card.keyword} in line {card.head.number}"
 
-    def _check_scope(self, card: _Card) -> None:
+    def _check_scope(self, card: _Keyword) -> None:
         """Reject a second part: labels are unique within one part only."""
         scope = self.opened[-1].keyword if self.opened else ""
         if self.meshed not in (None, scope):
             raise card.head.error("of a second part, or of the assembly; write one part with all of the mesh")
         self.meshed = scope
 
-    def _part(self, card: _Card) -> None:
+    def _part(self, card: _Keyword) -> None:
         if self.mesh.nodes:
             raise card.head.error("after the first one with nodes; write one part with all of the mesh")
 
-    def _node(self, card: _Card) -> None:
+    def _node(self, card: _Keyword) -> None:
         kind = card.parameters.get("SYSTEM", "R").upper()[:1]
         if kind not in ("R", "C"):
             raise card.head.error(f"SYSTEM={kind}: expected R or C; write rectangular or cylindrical coordinates")
-        frame = Frame(kind="cylindrical") if kind == "C" else Frame()
+        frame = CoordinateSystem(kind="cylindrical") if kind == "C" else CoordinateSystem()
         labels, points = [], []
         for line, row in card.numbers():
             if len(row) < 2 or not np.all(np.isfinite(row[:4])):
@@ -186,7 +186,7 @@ class _Deck:
             self.mesh.add_node(line, label, point)
         self._add(self.mesh.node_sets, card.parameters.get("NSET"), labels)
 
-    def _element(self, card: _Card) -> None:
+    def _element(self, card: _Keyword) -> None:
         name = card.parameters.get("TYPE", "").upper()
         matches = ((pattern.fullmatch(name), kinds) for pattern, kinds in _ELEMENTS)
         kind = next((kinds[int(m[1])] for m, kinds in matches if m and int(m[1]) in kinds), "")
@@ -207,7 +207,7 @@ class _Deck:
             labels.append(label)
         self._add(self.mesh.element_sets, card.parameters.get("ELSET"), labels)
 
-    def _node_set(self, card: _Card) -> None:
+    def _node_set(self, card: _Keyword) -> None:
         mesh, named = self.mesh, card.parameters.get("ELSET")
         if named is None:
             labels = self._members(card, mesh.nodes, mesh.node_sets)
@@ -217,11 +217,11 @@ class _Deck:
             ]
         self._add(mesh.node_sets, card.parameters.get("NSET"), labels)
 
-    def _element_set(self, card: _Card) -> None:
+    def _element_set(self, card: _Keyword) -> None:
         members = self._members(card, self.mesh.elements, self.mesh.element_sets)
         self._add(self.mesh.element_sets, card.parameters.get("ELSET"), members)
 
-    def _surface(self, card: _Card) -> None:
+    def _surface(self, card: _Keyword) -> None:
         """Take in faces of elements, by their numbers or all that are free; or the nodes of a node-based surface."""
         mesh, name, kind = self.mesh, card.parameters.get("NAME"), card.parameters.get("TYPE", "ELEMENT").upper()
         if not name or kind not in ("ELEMENT", "NODE"):
@@ -248,7 +248,7 @@ class _Deck:
             face = words[1].upper() if len(words) > 1 else ""
             faces.extend([self._face(single, label, face) for label in members] if face else self._free(set(members)))
 
-    def _face(self, card: _Card, label: int, face: str) -> tuple[int, ...]:
+    def _face(self, card: _Keyword, label: int, face: str) -> tuple[int, ...]:
         """Return the corners of a face of an element: S1, S2 ... of a solid, SPOS or SNEG of a shell."""
         kind, nodes = self.mesh.elements[label]
         faces = {f"S{number}": corners for number, corners in enumerate(_FACES.get(kind, []), 1)}
@@ -271,7 +271,7 @@ class _Deck:
         counts = Counter(tuple(sorted(face)) for _, face in faces)
         yield from (face for label, face in faces if label in members and counts[tuple(sorted(face))] == 1)
 
-    def _members(self, card: _Card, entities: dict[int, Any], sets: dict[str, list[int]]) -> list[int]:
+    def _members(self, card: _Keyword, entities: dict[int, Any], sets: dict[str, list[int]]) -> list[int]:
         labels: list[int] = []
         for line, words in card.data:
             if "GENERATE" in card.parameters:
@@ -292,9 +292,9 @@ class _Deck:
                 raise card.head.error(f"names {label}, which is not given before it")
         return [label for label in labels if label in entities]
 
-    def _system(self, card: _Card) -> None:
+    def _system(self, card: _Keyword) -> None:
         values = [value for _, row in card.numbers()[:2] for value in (row + [0.0] * 6)[: 6 if len(row) > 3 else 3]]
-        self.frame = Frame()
+        self.frame = CoordinateSystem()
         if not values:
             return
         origin = np.array(values[:3])
@@ -307,9 +307,9 @@ class _Deck:
                 axes = through(np.array(values[3:6]) - origin, np.array(values[6:9]) - origin)
         except ValueError as error:
             raise card.head.error(f"gives no axes: {error}") from error
-        self.frame = Frame(origin, axes)
+        self.frame = CoordinateSystem(origin, axes)
 
-    def _instance(self, card: _Card) -> None:
+    def _instance(self, card: _Keyword) -> None:
         if self.instance:
             raise card.head.error("is the second one; write one part with all of the mesh, in global coordinates")
         self.instance = card.parameters.get("NAME", "instance")
@@ -353,15 +353,15 @@ def _set_members(line: DeckLine, sets: dict[str, list[_Member]], name: str) -> l
     return sets[key]
 
 
-def _cards(path: Path) -> Iterator[_Card]:
+def _cards(path: Path) -> Iterator[_Keyword]:
     """Yield the keywords of a deck with their data."""
-    card: _Card | None = None
+    card: _Keyword | None = None
     for line in lines(path):
         if line.text.startswith("*"):
             if card is not None:
                 yield card
             keyword, parameters = _keyword(line.text)
-            card = _Card(line._replace(within=f"*{keyword} "), keyword, parameters, [])
+            card = _Keyword(line._replace(within=f"*{keyword} "), keyword, parameters, [])
         elif card is None:
             raise line.error("a row before the first keyword; is this a deck of Abaqus?")
         else:

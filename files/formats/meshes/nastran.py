@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.files.formats.meshes.frames import Frame, through
+from vanedamp.files.formats.meshes.frames import CoordinateSystem, through
 from vanedamp.files.formats.meshes.labelled_mesh import (
     LINES,
     SHELLS,
@@ -203,7 +203,7 @@ class _Systems:
     """Coordinate systems and grid points, resolved as they are asked for: each may stand on others."""
 
     def __init__(self, cards: list[_Card]) -> None:
-        self.frames: dict[int, Frame] = {0: Frame()}
+        self.frames: dict[int, CoordinateSystem] = {0: CoordinateSystem()}
         self.points: dict[int, np.ndarray] = {}
         self.pending: list[int] = []
         self.systems: dict[int, tuple[_Card, int]] = {}
@@ -238,7 +238,7 @@ class _Systems:
             self.points[label] = self.frame(system, card).to_global(local)[0]
         return self.points[label]
 
-    def frame(self, label: int, asked: _Card) -> Frame:
+    def frame(self, label: int, asked: _Card) -> CoordinateSystem:
         """Return a coordinate system in global terms."""
         if label in self.frames:
             return self.frames[label]
@@ -263,7 +263,7 @@ class _Systems:
             raise
         except ValueError as error:
             raise card.line.error(f"{error}") from error
-        self.frames[label] = Frame(points[0], np.array([x, y, z]), _KINDS[card.name[5]])
+        self.frames[label] = CoordinateSystem(points[0], np.array([x, y, z]), _KINDS[card.name[5]])
         return self.frames[label]
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vanedamp.files.formats.meshes.frames import Frame
+from vanedamp.files.formats.meshes.frames import CoordinateSystem
 from vanedamp.files.formats.meshes.labelled_mesh import DeckLine, LabelledMesh, MeshError, deck_lines
 from vanedamp.files.formats.meshes.universal_systems import SYSTEMS, frame_of, systems_of
 
@@ -57,7 +57,7 @@ def _point(line: DeckLine) -> np.ndarray:
 
 def read(path: Path) -> LabelledMesh:
     """Return the mesh of a file with its groups. Raises MeshError with file and line."""
-    mesh, systems, named = LabelledMesh(), dict[int, Frame](), []
+    mesh, systems, named = LabelledMesh(), dict[int, CoordinateSystem](), []
     for number, lines in _datasets(path):
         rows = iter(lines)
         try:
