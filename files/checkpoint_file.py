@@ -38,7 +38,7 @@ class CheckpointFile:
     def read(self) -> tuple[dict[str, Any], dict[str, Any]] | None:
         """Return variables and attributes of the file, None if there is none.
 
-        Raises InputError for a file of something else, or one that cannot be read.
+        Raises InputError for another file, or an unreadable one.
         """
         path = self._path
         if path is None or not path.exists():

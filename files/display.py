@@ -45,7 +45,7 @@ class Plotted(Displayed):
     """Base of results that have a figure."""
 
     def plot(self, scene: Any = None) -> Any:
-        """Return the interactive figure (plotly) of `vanedamp.plot`. scene: that of a response, for its walls."""
+        """Return the interactive figure (plotly) of `vanedamp.plot`. scene: of a response, for its walls."""
         import vanedamp
 
         return vanedamp.plot(self, scene)

@@ -22,7 +22,7 @@ class VanedampError(ValueError):
 
 def shortened(message: str) -> str:
     """Return a message with its long words, such as a key of a damaged file, cut in the middle, and not too long."""
-    text = re.sub(rf"\S{{{_WORD},}}", lambda found: _cut(found[0], _WORD), message)
+    text = re.sub(rf"\S{{{_WORD},}}", lambda match: _cut(match[0], _WORD), message)
     return _cut(text, _MESSAGE)
 
 

@@ -1,4 +1,4 @@
-"""Parts that are found or named, not imported: modules of ours, and what other packages add by entry points.
+"""Parts that are found or named, not imported: our own modules, and other packages' entry points.
 
 An installed package adds a part in its pyproject.toml, without a change here:
 
@@ -20,7 +20,7 @@ from vanedamp.files.errors import VanedampError
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-#: place of a part that has no ORDER: after those that have one
+#: order of a part without ORDER: after parts that have one
 _LAST = 1000
 
 
@@ -67,7 +67,7 @@ class ExtensionPoint(NamedTuple):
 
 
 def added_parts(kind: str, group: str) -> dict[str, Any]:
-    """Return what other packages add under a group, by name. Raises ExtensionError for what cannot be loaded."""
+    """Return other packages' parts of a group by name. Raises ExtensionError for one that cannot be loaded."""
     return {name: _load(entry, kind, ()) for name, entry in _added(kind, group, {}).items()}
 
 

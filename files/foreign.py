@@ -69,8 +69,8 @@ def reading(path: str | os.PathLike[str], error: type[VanedampError], expected: 
 
 
 def self_contained(file: h5py.File) -> None:
-    """Check that an HDF5 file holds all its data: what leads to other files would show these, and shapes without data
-    would fill the memory.
+    """Check that an HDF5 file holds all its data: links would expose other files, and shapes without data would fill
+    the memory.
 
     Raises VanedampError for links other than hard ones, data in other files (external or virtual), and shapes that
     the bytes of the file cannot fill.
@@ -102,9 +102,9 @@ def self_contained(file: h5py.File) -> None:
 
 
 def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callable[[], _Read]) -> _Read:
-    """Return what `read` makes of a file, called in a fork of this process: damage may crash or hang its library.
+    """Return the result of `read` for a file, called in a fork of this process: damage may crash or hang its library.
 
-    What it returns is pickled. Raises `error` for a fork that ends by a signal, and for an error about input of
+    The result is pickled. Raises `error` for a fork that ends by a signal, and for an error about input of
     `read`; ValueError with the words of another exception. Where the system has no forks, `read` is called here.
     """
     if not hasattr(os, "fork"):
@@ -135,7 +135,7 @@ def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callab
 
 
 def _answer(read: Callable[[], object], writing: int, seconds: int, memory: int) -> None:
-    """Read, silently, write what comes of it, and end this process."""
+    """Read silently, write the result, and end this process."""
     try:
         for number in _DEADLY:
             signal.signal(number, signal.SIG_DFL)

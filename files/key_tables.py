@@ -22,7 +22,7 @@ Record = TypeVar("Record")
 Schema = dict[str, Any]
 #: the part of a key's path that the file chooses: [interface.<name>]
 NAME = "<name>"
-#: a default that a description tells in words
+#: a default that the description states in words
 DEFAULT = re.compile(r" \(default: ([^()]+)\)")
 #: types of JSON in words
 WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
@@ -93,7 +93,7 @@ def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[K
 
 
 def _own_tables(schema: Schema, node: Schema) -> list[Schema]:
-    """Return the tables of a file that a node stands for, those in a list as well.
+    """Return the tables of a file that a node stands for, including tables in a list.
 
     Inline tables are values, and so are names with values where a list or a text would do as well.
     """
@@ -107,7 +107,7 @@ def _own_tables(schema: Schema, node: Schema) -> list[Schema]:
 
 
 def _distinguishing(table: Schema, among: list[Schema]) -> dict[str, str]:
-    """Return the key that tells a table from others of its name, with its value."""
+    """Return the key that distinguishes a table from others of its name, with its value."""
     if len(among) < 2:
         return {}
     here = constants(table)

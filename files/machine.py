@@ -1,4 +1,4 @@
-"""What a machine lacks, by the errors that say so: packages and memory."""
+"""Missing packages and memory of a machine, recognised by errors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def not_loaded(error: ImportError | OSError) -> str | None:
 
 
 def out_of_memory(error: BaseException | None) -> str | None:
-    """Return what the memory has no room for, in the words of an error or of its causes; None for another error."""
+    """Return the message of an error about memory, or of such a cause of it; None for another error."""
     reason = None
     while error is not None:
         no_memory = isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM

@@ -7,9 +7,10 @@
         amplitude: Annotated[np.ndarray, Array(("time", "body"), "m")]
         status: str
 
-A field is an array (Array), arrays by name (Columns), a tuple of small records of one class, whose fields are columns
-(Rows), a tuple of parts that have arrays of different lengths (Ragged), arrays by dotted path (Paths), a sparse matrix
-(Sparse), another record in the same file (Within), or plain data that pydantic knows: an attribute of the file.
+A field is an array (Array), arrays by name (NamedArrays), a tuple of small records of one class, whose fields are
+columns (RecordRows), a tuple of parts that have arrays of different lengths (Ragged), arrays by dotted path (Paths), a
+sparse matrix (SparseMatrix), another record in the same file (Within), or plain data that pydantic accepts: an
+attribute of the file.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ class Array(NamedTuple):
 
 
 class RecordRows(NamedTuple):
-    """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `Unit`s.
+    """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `NumberUnit`s.
 
     Those that have defaults are left out where all rows have all of these.
     """
@@ -89,7 +90,7 @@ class Ragged(NamedTuple):
     """A tuple of dataclasses with declared fields, each with rows of its own number along `dim`.
 
     The rows of all stand one after the other, and "<thing>_of_<dim>" says whose each is. What has no rows is a variable
-    along `thing`; Rows have "<dim of the rows>_<thing>" in the same way. prefix: of names, and of `dim`, in the file.
+    along `thing`; RecordRows have "<dim of the rows>_<thing>" in the same way. prefix: of names and `dim` in the file.
     """
 
     thing: str
@@ -150,7 +151,7 @@ class SparseMatrix(NamedTuple):
 
 
 class Own(NamedTuple):
-    """A field with functions that return its variables, and find it in those of a file.
+    """A field with functions that return its variables, and read it from the variables of a file.
 
     Without: one that its class writes and reads by itself, in `variables`, `attributes`, `derived` and `of`.
     """
@@ -187,7 +188,7 @@ class Coded(NamedTuple):
 Layout = (
     Array | NamedArrays | RecordRows | Ragged | Paths | SparseMatrix | Within | Own | Named | Coded | NumberUnit | None
 )
-#: layouts of what is no attribute
+#: layouts of fields that are not attributes
 _VARIABLES = (NamedArrays, RecordRows, Ragged, Paths, SparseMatrix, Within, Own)
 
 
@@ -217,7 +218,7 @@ class Record(Displayed):
         return {}
 
     def dimensions(self) -> dict[str, tuple[str, ...]]:
-        """Return what dimensions of declared fields stand for, such as those of a grid, by name."""
+        """Return the actual dimensions by declared dimension, such as the axes of a grid."""
         return {}
 
     def dims(self, declared: tuple[str, ...]) -> tuple[str, ...]:
@@ -388,7 +389,7 @@ class Record(Displayed):
 
     @classmethod
     def given(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-        """Return the fields in a file by name, but those of its Own."""
+        """Return the fields in a file by name, except those written by the class itself."""
         fields: dict[str, Any] = {}
         optional = _optional(cls)
         for field, (kind, layout) in declared(cls).items():
@@ -530,7 +531,7 @@ def _parts(values: np.ndarray, imaginary: str) -> dict[str, np.ndarray]:
 
 
 def _is_frozen(value: Any, dtype: Any) -> bool:
-    """Whether a value is what `store.frozen` returns, so that records that are made of others need no copies."""
+    """Whether a value is a result of `store.frozen`, so that records made from other records need no copies."""
     frozen = isinstance(value, np.ndarray) and value.base is None and not value.flags.writeable
     return frozen and value.dtype == dtype and value.flags.c_contiguous
 
@@ -585,7 +586,7 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def _is_tuple(kind: Any) -> bool:
-    """Whether a type is that of a tuple, or of None else."""
+    """Whether a type is a tuple, or a tuple or None."""
     kinds = get_args(kind) if type(None) in get_args(kind) else (kind,)
     return any(get_origin(option) is tuple for option in kinds)
 

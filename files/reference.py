@@ -55,7 +55,7 @@ class FileKind(NamedTuple):
 
     @property
     def schema(self) -> dict[str, Any]:
-        """JSON Schema of the record: every key with what it holds."""
+        """JSON Schema of the record: every key with its meaning."""
         return schema(self.record)
 
     @property

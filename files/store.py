@@ -202,7 +202,7 @@ def json_text(data: Any) -> str:
 
 
 def digest(path: str | os.PathLike[str]) -> str:
-    """Return the SHA-256 of a file's bytes, which says what file a result comes from."""
+    """Return the SHA-256 of a file's bytes, which identifies the source of a result."""
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 

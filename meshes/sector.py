@@ -159,7 +159,7 @@ def _divided(breaks: list[float], size: float) -> np.ndarray:
 
 
 def _kinds(sector: Sector, lines: list[np.ndarray]) -> np.ndarray:
-    """Return what every cell of the grid is."""
+    """Return the kind of every cell of the grid."""
     radii, angles, heights = np.meshgrid(*(0.5 * (line[:-1] + line[1:]) for line in lines), indexing="ij")
     angles, heights = np.abs(angles), np.abs(heights)
     blade = (angles < _angle(sector, sector.blade_thickness)) & (heights < 0.5 * sector.axial_width)

@@ -1,4 +1,4 @@
-"""Linear algebra common to modes and reduced models, in numpy: Ritz values, signs of shapes, symmetric parts, turns."""
+"""Linear algebra common to modes and reduced models, in numpy: Ritz values, signs, symmetric parts, rotations."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def krylov(
 
     start   (n, m) fields that span the first block
     solve   K^-1 applied to loads (n, m)
-    select  the part of a block to keep, from the block and those before; left out: all of it
+    select  returns the part of a block to keep, from the block and the earlier blocks; default: all of it
 
     Each block is the static response to the inertia of the one before: it says how the structure lags behind that, to
     the next order in omega^2 (Craig and Hale 1988, J. Guidance 11(6), block-Krylov component synthesis). It has no
@@ -144,6 +144,6 @@ def speed_weights(speed: float, greatest: float, count: int) -> np.ndarray:
 
 
 def added_by_speed(speed: float, greatest: float, matrices: Sequence[Any]) -> Any:
-    """Return what a speed adds to a stiffness: the sum of matrices by their `speed_weights`."""
+    """Return the stiffness added at a speed: the sum of matrices, weighted by `speed_weights`."""
     weights = speed_weights(speed, greatest, len(matrices))
     return sum(weight * matrix for weight, matrix in zip(weights, matrices, strict=True))

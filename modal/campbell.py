@@ -98,7 +98,7 @@ def campbell(
 
 
 def neglected_notes(error: float) -> list[str]:
-    """Return the warning of a relative error of frequencies for what the stiffness neglects between its speeds."""
+    """Return the warning of a relative error of frequencies, due to interpolating the stiffness between speeds."""
     if error <= _NOTABLE:
         return []
     return [

@@ -149,10 +149,10 @@ def _refine(source: SpeedRange, speeds: np.ndarray, tolerance: float) -> None:
 
 
 class _Waves(SpeedRange):
-    """A basis for the real form of a diameter, with i times every field, so that its two waves can be told apart."""
+    """A basis for the real form of a diameter, with i times every field, to separate its two waves."""
 
     def of_sense(self, sense: int) -> SmallMatrices:
-        """Return the small matrices of the waves exp(i (omega t + h j alpha)), omega > 0, or of those with -h."""
+        """Return the small matrices of the waves exp(i (omega t + h j alpha)), omega > 0, or of the waves with -h."""
         basis = self.basis
         turned = basis.T @ (self.rotating.standing.of_free(self.rotating.standing.mass) @ _turned(basis.T).T)
         values, vectors = np.linalg.eigh(-1j * sense * turned)

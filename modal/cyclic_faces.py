@@ -62,9 +62,9 @@ def check_sides(
         patch.weights @ (matrices.coordinates[patch.nodes] - point) / patch.area
         for patch in (matrices.patch(low), matrices.patch(high))
     )
-    turn = rotation(axis, 2.0 * math.pi / sectors)
-    next_one, other = (float(np.linalg.norm(second - place)) for place in (turn @ first, turn.T @ first))
-    if next_one > (1.0 + _ANGLE) * other:
+    rotated = rotation(axis, 2.0 * math.pi / sectors)
+    next_one, before = (float(np.linalg.norm(second - centre)) for centre in (rotated @ first, rotated.T @ first))
+    if next_one > (1.0 + _ANGLE) * before:
         raise CyclicError(
             "ring.spring.low: low and high are swapped: a positive turn about the axis leads to the next sector, but "
             f"{high!r} is nearer to {low!r} of the one before"

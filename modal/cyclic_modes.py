@@ -67,9 +67,9 @@ def ring_modes(
     return gathered(sector, families, dict(sector.matrices.provenance) | {"solver": provenance["solver"]})
 
 
-def gathered(sector: CyclicSector, found: Sequence[Family], provenance: Mapping[str, Any]) -> RingModes:
+def gathered(sector: CyclicSector, families: Sequence[Family], provenance: Mapping[str, Any]) -> RingModes:
     """Return the record of modes by diameter."""
-    numbers, frequencies, residuals, shapes = zip(*found, strict=True)
+    numbers, frequencies, residuals, shapes = zip(*families, strict=True)
     counts = [len(values) for values in frequencies]
     return RingModes(
         sector.sectors,

@@ -50,7 +50,7 @@ def gyroscopic_ring_modes(
 
     sector    for the ring's geometry; diameters and report: as in `ring_modes`
 
-    Raises what `ring_modes` and modal.gyroscopic.gyroscopic_modes raise.
+    Raises the errors of `ring_modes` and modal.gyroscopic.gyroscopic_modes.
     """
     stiffness = rotating.standing.stiffness + rotating.added(speed)
     here = replace(sector, matrices=replace(rotating.standing, stiffness=stiffness))
@@ -88,7 +88,7 @@ def _waves(
         )
         waves = [(problem.number, basis, *dense_modes(stiffness, coupling)),
                  (-problem.number, basis.conj(), *dense_modes(stiffness.conj(), coupling.conj()))]  # fmt: skip
-        # the lowest in size of both are those of the real form; beyond them the basis knows none
+        # the lowest of both in size are the modes of the real form; the basis has no others
         last = modes.frequencies_hz[-1] * 2.0 * np.pi * (1.0 + 1e-9)
         fewest = min(int(np.count_nonzero(omega <= last)) for _, _, omega, _ in waves)
         if fewest >= count or asked == most:

@@ -104,7 +104,7 @@ class _Ritz(Subspace):
         return values, vectors
 
     def restart(self, vectors: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Keep Ritz vectors (k, m) and those of the last round (j <= k, m) only; return the former in the rows."""
+        """Keep only Ritz vectors (k, m) and those of the last round (j <= k, m); return the former in the new rows."""
         basis, earlier = vectors, np.zeros_like(vectors)
         earlier[: len(before)] = before[:, : vectors.shape[1]]
         for _ in range(2):  # the two are nearly the same

@@ -23,7 +23,7 @@ __all__ = [
 
 # of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
 _SHIFT = -1e-4
-#: modes beyond those asked for, among which the gap is sought where they are counted; the least gap, relative
+#: further modes among which a gap is sought where modes are counted; the least relative gap
 SPARE = 3
 _GAP = 1e-6
 # more modes than this are found faster slice by slice
@@ -49,7 +49,7 @@ def solve_modes(
             "auto"       iterative where the factors are estimated to need more than half of the memory
     memory  of the machine, bytes; None: found out
 
-    Free and partly held structures show their rigid modes at zero frequency: those whose strain energy is within
+    Free and partly held structures have rigid modes at zero frequency: modes whose strain energy is within
     round-off. Raises SolverError for a count that the structure does not have, no mode in the range, or no convergence.
     """
     free = matrices.free

@@ -159,7 +159,7 @@ class Solid:
         growth = None
         if temperature is not None:
             stretch = self._field(lambda material, values: 1.0 + material.expansion * (values - temperature.reference))
-            # moduli are those of the grown body: E d/dx and the volume give one factor of the stretch, of three
+            # moduli refer to the expanded body: E d/dx and the volume leave one of three factors of the stretch
             softening = self._field(lambda material, values: material.softening(values)) / stretch
             self._lame, self._shear = softening * self._lame, softening * self._shear
             if any(material.expansion for material in self.materials.values()):
@@ -221,7 +221,7 @@ class Solid:
         statics: Statics | None = None,
         speed: float = 0.0,
     ) -> RotatingMatrices:
-        """Return what rotation about an axis through a point (m) makes of the matrices at standstill.
+        """Return the matrices of the structure rotating about an axis through a point (m), from those at standstill.
 
         They hold up to `speed` (rad/s). The stiffness is that about the centrifugal equilibrium, which `statics`
         (default: the body's own) finds, at that speed and at its half in the square, and a polynomial through these.
@@ -375,11 +375,11 @@ class Solid:
     def _followed(
         self, equilibria: Equilibria, still: RotatingMatrices, softening: sparse.csr_array, before: sparse.csr_array
     ) -> list[np.ndarray]:
-        """Return the displacements (N,) at 1/4, 1/2 and all of the greatest squared speed.
+        """Return the displacements (N,) at 1/4, 1/2 and 1 times the maximum squared speed.
 
-        Newton's method goes straight there. Where that leads to none, or to an unstable one, they are followed in small
-        steps along stable ones, since beyond an instability another equilibrium may be found; but only if the stress
-        alone leaves the structure stable. Raises UnstableError.
+        Newton's method first goes there directly. If it fails, or ends at an unstable equilibrium, stable ones are
+        followed in small steps, since others may exist beyond an instability; but only if the stress by itself leaves
+        the structure stable. Raises UnstableError.
         """
         top, load, standing, standstill = still.greatest**2, still.load, still.standing, self._expanded
         slope = equilibria.solve(load)

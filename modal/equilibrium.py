@@ -82,9 +82,9 @@ class Deformation:
 
         shapes  displacements (N,) at a = 0, 1/2 and 1, between which these and, by itself, their stress are quadratic
 
-        Of shapes so interpolated, `deformed` is that of a real shape, never of less than no stiffness. A tangent that
-        was interpolated as a matrix would stretch a slender body where it bends, as it is thousands of times as stiff
-        against the one as against the other.
+        With interpolated shapes, `deformed` belongs to a real shape, so that its stiffness is never negative. An
+        interpolated tangent matrix would stretch a slender body where it bends, and stretching is thousands of times
+        stiffer.
         """
         initial, half, whole = shapes
         linear, squared = _quadratic(half - initial, whole - initial)
@@ -104,7 +104,7 @@ class Deformation:
 
 
 def _quadratic(half: Any, whole: Any) -> tuple[Any, Any]:
-    """Return the coefficients of a and a^2 of what is 0 at a = 0 and has values at 1/2 and 1."""
+    """Return the coefficients of a and a^2 of a polynomial that is 0 at a = 0, from its values at 1/2 and 1."""
     return 4.0 * half - whole, 2.0 * whole - 4.0 * half
 
 
@@ -114,7 +114,7 @@ class Equilibria:
     deformation  of the solid
     statics      by which it is solved
     matrices     about the shape at which it stands
-    springs      (N, N) N/m, what else resists, in proportion to the displacements
+    springs      (N, N) N/m, further stiffness, linear in the displacements
 
     A context manager, which holds the factors. Raises SolverError for a structure that nothing holds.
     """

@@ -59,8 +59,8 @@ class Domain:
     mesh           dolfinx.mesh.Mesh, metres
     volumes        volume group name -> cell indices; cells outside every group are in the group "unnamed"
     facets         facet group name -> indices of boundary facets
-    edges, points  groups of element edges and of vertices: name -> their indices, without those of its own facets
-    path, sha256   the file and the hash of its bytes, with those of files that it includes
+    edges, points  groups of element edges and of vertices: name -> their indices, except on facets of that name
+    path, sha256   the file and the hash of its bytes, including the files that it includes
     """
 
     mesh: Any
@@ -84,7 +84,7 @@ class Domain:
         return entities_of
 
     def group(self, name: str) -> list[tuple[int, np.ndarray]]:
-        """Return one of `groups`. Raises MeshError with those that exist, by kind."""
+        """Return one of `groups`. Raises MeshError with the existing groups by kind."""
         if name not in self.groups:
             kinds = {"edge": self.edges, "point": self.points}
             lower = "".join(f"; {kind} groups: {', '.join(sorted(names))}" for kind, names in kinds.items() if names)
@@ -169,7 +169,7 @@ def cell_constants(domain: Domain, values: Mapping[str, float]) -> Any:
 
 
 def cell_functions(domain: Domain, values: Callable[[str, np.ndarray], np.ndarray]) -> Any:
-    """Return a function that is linear in every cell, its values (n,) given by volume group and places (n, 3), m."""
+    """Return a function that is linear in every cell, with values (n,) by volume group and points (n, 3), m."""
     space = discontinuous_space(domain, 1)
     function = fem.Function(space)
     points = node_coordinates(space)
@@ -401,7 +401,7 @@ def _corner_nodes(mesh: Any, cells: int, corners: int) -> np.ndarray:
 
 
 def _indices(entities: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.ndarray:
-    """Return the indices (int32) of rows of gmsh nodes among known ones. Raises MeshError for one that is not there."""
+    """Return the indices (int32) of wanted entities, rows of gmsh nodes. Raises MeshError for a missing one."""
     width = int(max(entities.max(), wanted.max())) + 1
     keys, asked = (np.sort(rows, axis=1) @ width ** np.arange(rows.shape[1])[::-1] for rows in (entities, wanted))
     order = np.argsort(keys)
@@ -415,7 +415,7 @@ def _indices(entities: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> 
 def _beyond(
     topology: Any, facets: Mapping[str, np.ndarray], lower: Mapping[str, np.ndarray], dimension: int
 ) -> dict[str, np.ndarray]:
-    """Return groups of edges (dimension 1) or vertices (0) without those of the facets of their name."""
+    """Return groups of edges (dimension 1) or vertices (0), except those on facets of the same name."""
     remaining = {}
     for name, entities in lower.items():
         if name in facets:

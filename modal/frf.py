@@ -16,7 +16,7 @@ QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}
 UNITS = {"receptance": "m/N", "mobility": "m/(N s)", "accelerance": "m/(N s^2)"}
 # fraction of a damping ratio: a standard deviation above it means that the response does not determine the pole
 _UNCERTAIN = 0.5
-# fraction of the line spacing: in a narrower half-power bandwidth not two lines see a mode rise to half of its peak
+# fraction of the line spacing: with a narrower half-power bandwidth, less than two lines show half of a mode's peak
 _NARROW = 0.5
 # root mean square of the error over the response's: with a larger error, the fit does not describe it. Noise
 # of a tenth of the peak over forty bandwidths leaves 0.41
@@ -218,7 +218,7 @@ def _check_misfit(poles: Poles, frf: Frf) -> None:
     """Reject a fit that misses the response as a whole or around one of its poles."""
     missed = {f"the band {_span(frf)}": poles.misfit}
     for frequency, ratio in zip(poles.frequencies_hz, poles.damping_ratios, strict=True):
-        # wide enough for one line of those that the least bandwidth allows
+        # wide enough for one line at the least bandwidth
         near = np.abs(frf.frequencies_hz - frequency) <= 2.0 * ratio * frequency
         error = np.linalg.norm((poles.fitted - frf.values)[:, near])
         missed[f"the peak at {frequency:.6g} Hz"] = float(error / np.linalg.norm(frf.values[:, near]))

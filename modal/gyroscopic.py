@@ -24,7 +24,7 @@ from vanedamp.modal.algebra import hermitian_part, orthonormal
 from vanedamp.modal.eigen import SPARE, SolverError, factorize, shape_signs, solve_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
-# residual of a mode; round-off leaves some 1e-8 of a slender beam's first one
+# residual of a mode; round-off leaves about 1e-8 for a slender beam's first mode
 _TOLERANCE = 1e-6
 # corrections of a mode, each as good as a step of a Krylov method, after which something is wrong
 _ROUNDS = 30
@@ -60,7 +60,7 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     """Return the lowest `count` modes at a speed (rad/s), with the gyroscopic coupling.
 
     A space that begins with the modes without it grows by corrections K^-1 Q x, until all residuals are small. That
-    none is missed is proved by the count of those modes or, where they lie too close, by Q's inertia. Raises
+    none is missed is proved by the count of the modes without it or, where they lie too close, by Q's inertia. Raises
     SolverError for a count that the structure does not have, no convergence, or a missed mode, and UnstableError at a
     speed without stable equilibrium.
     """
@@ -138,7 +138,7 @@ def dense_modes(stiffness: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray
 
 
 def _known_count(still: np.ndarray, speed: float, count: int) -> tuple[float, int] | None:
-    """Return a frequency (rad/s) above `count` modes and how many lie below it, if the modes without coupling tell."""
+    """Return a frequency (rad/s) above `count` modes and how many lie below it; None: not known without coupling."""
     last = np.arange(count, len(still))
     lower = np.hypot(still[last - 1], speed) + speed
     upper = np.hypot(still[last], speed) - speed

@@ -125,7 +125,7 @@ class Iteration:
 
     def _vertex_multigrid(self, vertices: sparse.csr_array) -> VertexMultigrid:
         up = sparse.csr_array(sparse.kron(vertices, sparse.identity(3), format="csr"))
-        # of a vertex that is held, nothing is left but what its neighbours would follow
+        # a fixed vertex has no motion of its own
         is_fixed = np.ones(up.shape[0])
         is_fixed[self._free] = 0.0
         to_vertices = sparse.csr_array(up[self._free][:, is_fixed @ up < 1.0])

@@ -33,7 +33,7 @@ class NotConvergedError(ArithmeticError):
 
 
 def block(count: int) -> int:
-    """Return how many right-hand sides a solve has for `count` eigenpairs: fewer cost more each, more are more work."""
+    """Return the number of right-hand sides per solve for `count` eigenpairs: fewer cost more each, more add work."""
     return min(max(count // 4, 4), 12)
 
 

@@ -50,7 +50,7 @@ def read_matrices(
 
     stiffness, mass  .mtx (Matrix Market, symmetric or general, or Abaqus), .npz (scipy.sparse.save_npz), .csv (dense),
                      .mat, or CalculiX's .sti and .mas with their .dof, N/m and kg; of a file with several matrices
-                     those named stiffness and mass, or K and M
+                     the ones named stiffness and mass, or K and M
     nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels, in
                      any order for CalculiX, and for Abaqus' matrices that name their nodes. Degrees of freedom that
                      CalculiX's .dof leaves out are held
@@ -180,12 +180,12 @@ def _matrix(path: Path, name: str) -> sparse.csr_array:
         return matrix if isinstance(matrix, GlobalMatrix) else sparse.csr_array(matrix)
     except MatricesError:
         raise
-    except Exception as error:  # the readers raise what they stumble over
+    except Exception as error:  # the readers raise many types
         raise MatricesError(f"{path}: not a readable matrix ({error})") from error
 
 
 def _placed(path: Path, matrix: sparse.csr_array, labels: Mapping[int, int]) -> tuple[sparse.csr_array, np.ndarray]:
-    """Return a matrix among all degrees of freedom, and those that a .dof file, lines of node.direction, leaves out."""
+    """Return a matrix over all degrees of freedom, and those missing in a .dof file (lines of node.direction)."""
     words = existing(path, MatricesError, "file of the matrix's coordinates").read_text(errors="replace").split()
     dofs = []
     for number, word in enumerate(words, 1):
@@ -215,7 +215,7 @@ def _by_node(path: Path, matrix: GlobalMatrix, rows: np.ndarray, labels: Mapping
 
 
 def _named(path: Path, name: str, matrices: Mapping[str, Any]) -> Any:
-    """Return the only matrix of a file, or the one of that name or letter."""
+    """Return the only matrix of a file, or the matrix with that name or letter."""
     names = [key for key in matrices if len(matrices) == 1 or key.lower() == name] or [
         key for key in matrices if key == _LETTERS[name]
     ]

@@ -104,7 +104,7 @@ def read_frf(
     A table has a column of frequencies, then of every response one column of complex numbers, or two: real and
     imaginary part, or magnitude and phase. The header says which, with units; values are converted to SI.
 
-    quantity   receptance, mobility or accelerance (default: that of the unit, or else receptance)
+    quantity   receptance, mobility or accelerance (default: by the unit, or else receptance)
     columns    one of COLUMNS where the header does not say; columns that look like magnitude and phase, without a word
                that says so, are rejected
     unit       of the values, where the file gives none: "g/N", "dB re 1 m/N"
@@ -275,8 +275,8 @@ def _label(column: Column) -> str:
 def check_phase(path: object, error: type[VanedampError], values: np.ndarray, conjugate: bool) -> None:
     """Raise `error` if the phase of responses (k, n) at ascending frequencies rises where they are large.
 
-    Every stable pole turns the phase of exp(iwt) down by about half a turn: they are those of exp(-iwt), or have been
-    conjugated without need.
+    With exp(iwt), every stable pole lowers the phase by about half a turn: otherwise the phases are of exp(-iwt), or
+    were conjugated without need.
     """
     steps = values[:, 1:] * values[:, :-1].conj()
     weighted = np.abs(steps) * np.angle(steps)

@@ -341,7 +341,7 @@ def _edges(source: _Source) -> np.ndarray:
 def _lower_groups(
     source: _Source, edges: np.ndarray, facets: dict[str, np.ndarray], wanted: Collection[str] | None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return what sets hold besides their facets (n, k): name -> indices of edges, name -> corners of elements."""
+    """Return the entities of sets outside their facets (n, k): name -> indices of edges, name -> element corners."""
     corners = np.unique(source.cells[:, : source.shape.corners])
     keys = {key: index for index, key in enumerate(_keys(edges, 2))}
     lines: dict[str, np.ndarray] = {}

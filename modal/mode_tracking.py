@@ -18,7 +18,7 @@ from vanedamp.modal.speed_range import SpeedModes, SpeedRange
 
 #: MAC of one mode at neighbouring speeds, at least
 CLEAR_MAC = 0.9
-#: least fraction of its shape that a mode takes over from another one for a veering
+#: least fraction of its shape that a mode takes over from another mode in a veering
 LEAST_EXCHANGE = 0.25
 #: speeds closer than this fraction of the range are no longer divided
 _CLOSEST = 1e-8
@@ -106,7 +106,7 @@ class Tracks:
             self.number.append(number)
 
     def _between(self, left: SpeedModes, right: SpeedModes, pairs: Pairing) -> float | None:
-        """Return a speed that has to come between two; None where the pairs are clear."""
+        """Return a speed needed between two; None where the pairs are clear."""
         # the highest may be crossed by one that is not computed
         complete = np.arange(left.frequencies.size - (not self.source.whole))
         clear = np.isin(complete, pairs.first).all() and np.isin(complete, pairs.second).all()
@@ -149,7 +149,7 @@ class Tracks:
         return self.source.modes(low)
 
     def _coincide(self, modes: SpeedModes, index: int) -> bool:
-        """Say whether the index-th and the next frequency are one."""
+        """Whether the index-th and the next frequency coincide."""
         low, high = modes.frequencies[index : index + 2]
         return bool(high - low <= self.same * high)
 

@@ -195,7 +195,7 @@ def _other_pairing(
 ) -> tuple[np.ndarray, Any] | None:
     """Return other modes and the search for them, where they meet the frequencies far better or with far less change.
 
-    As many factors as frequencies may meet them with any modes: then the change of the factors tells.
+    With as many factors as frequencies, any modes may fit: then the change of the factors decides.
     """
     enough = len(problem.parts) == len(problem.target)
     if miss <= _SCATTER and not enough:

@@ -21,7 +21,7 @@ from vanedamp.modal.petsc import PETSc, Product, SolverError, factorize, owned
 
 # steps of the smoother, and the part of the spectrum, below the largest eigenvalue, that it is to damp
 _STEPS, _DAMPED = 3, 15.0
-# rounds of the power method for that eigenvalue, and what they may miss
+# rounds of the power method for that eigenvalue, and its possible error
 _ROUNDS, _SAFE = 15, 1.1
 _OPTIONS = {"pc_gamg_type": "agg", "pc_gamg_agg_nsmooths": 1, "pc_gamg_threshold": 0.01}
 _PREFIX = "vanedamp_mg_"
@@ -77,7 +77,7 @@ class Aggregation:
 
     def __init__(self, stiffness: sparse.csr_array, dofs: np.ndarray, rigid_motions: np.ndarray) -> None:
         self._dofs, size = dofs, rigid_motions.shape[1]
-        if dofs.size < size:  # GAMG wants whole nodes: the DOFs that are fixed stand alone
+        if dofs.size < size:  # GAMG requires all DOFs of a node: fixed DOFs are decoupled
             spread = sparse.csr_array((np.ones(dofs.size), (dofs, np.arange(dofs.size))), (size, dofs.size))
             diagonal = np.full(size, stiffness.diagonal().mean())
             diagonal[dofs] = 0.0

@@ -48,7 +48,7 @@ def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray],
 def rivals(modes: Modes, mode: int, functional: np.ndarray, within: float, share: float) -> np.ndarray:
     """Return the indices of the other modes near a mode in frequency that move a functional (N,), too.
 
-    Those whose frequency lies within a relative distance of the mode's, and whose modal compliance at the functional,
+    Modes whose frequency lies within a relative distance of the mode's, and whose modal compliance at the functional,
     (w^T phi)^2, is at least the fraction `share` of the mode's.
     """
     frequency, seen = modes.frequencies_hz[mode], (modes.shapes @ functional) ** 2

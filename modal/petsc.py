@@ -105,7 +105,7 @@ class Factorization:
 
 
 class Product:
-    """A sparse matrix (m, n) that is applied to rows (k, n): several of them share a pass over its entries."""
+    """A sparse matrix (m, n) that is applied to rows (k, n), several in one pass over its entries."""
 
     def __init__(self, matrix: sparse.csr_array) -> None:
         self.shape = matrix.shape
@@ -188,8 +188,8 @@ def interval_eigenpairs(
 def one_analysis() -> Iterator[None]:
     """Within this context, factorise a matrix with the ordering and symbolic factors of one with the same pattern.
 
-    The last factors of each solver are kept for it, which takes memory; those of the next matrix take their place, so
-    that a Factorization serves until then. Without effect on several ranks.
+    The last factors of each solver are kept for it, which takes memory. The factors of the next matrix replace them, so
+    that a Factorization is valid until then. Without effect on several ranks.
     """
     global _analysed
     before, _analysed = _analysed, {} if parallel.COMM.size == 1 else None

@@ -88,10 +88,10 @@ class Rational:
         White noise gives a pole at a fixed place the fraction Beta(k, (N - p)/2) of the misfit without it:
         2 k coefficients, N values, p parameters in all. Complex values count as one number each, not two, so that the
         bound also holds for noise in one of their parts only. A fit chooses the place (Davies 1987; Adler and Taylor
-        2007): the expected number of places that reach a level u is that of one place times the area of the half
+        2007): the expected number of places that reach a level u is that of a single place times the area of the half
         plane of poles in the metric of their correlation. Poles f + i b/2 correlate like Cauchy kernels, metric
         |df|^2/b^2, so bands of n lines and bandwidths from half a line spacing have the area n and the edge 2 n: 6 to
-        9 places a line at the levels 25 to 40 that count.
+        9 places per line at the relevant levels 25 to 40.
         """
         responses, lines = self.values.shape
         freedom = 2 * responses * lines - responses * (2 * fit.poles.size + 2) - 2 * fit.poles.size
@@ -122,7 +122,7 @@ class Rational:
 
     @cached_property
     def _outside(self) -> np.ndarray:
-        """Functions (n, 2) of the stiffness of modes above the band and of the mass of those below."""
+        """Functions (n, 2) of the stiffness of modes above the band and of the mass of modes below it."""
         return np.column_stack([np.ones_like(self.s), self.s**-2.0])
 
     @cached_property
@@ -175,7 +175,7 @@ class Rational:
         values = self.values[:, :, None]
         shared = np.broadcast_to(basis, (len(values), *basis.shape))
         rows = np.concatenate([shared, -values * common, values], axis=2)
-        # the common denominator fits the rest that the response's own coefficients leave
+        # the common denominator fits the residual of the response's own coefficients
         triangles = np.asarray(np.linalg.qr(np.concatenate([rows.real, rows.imag], axis=1), mode="r"))
         remainder = triangles[:, width:, width:].reshape(-1, 2 * count + 1)
         weights = np.linalg.lstsq(remainder[:, :-1], remainder[:, -1], rcond=None)[0]

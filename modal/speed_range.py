@@ -1,7 +1,7 @@
 """Modes of a rotating structure at any speed of a range, from full solutions at a few speeds.
 
 The modes at those speeds, joined, are a Ritz basis for all others (Balmes 1996, Mech. Syst. Signal Process. 10): a
-dense problem of some dozen coordinates a speed in place of a sparse one. Frequencies are second-order in the error of
+dense problem of some dozen coordinates per speed instead of a sparse one. Frequencies are second-order in the error of
 the shapes, and the error is estimated from the residual with the full matrices.
 """
 
@@ -21,9 +21,9 @@ from vanedamp.modal.rotating import RotatingMatrices
 
 # of the unit length of a shape: missing part of it for which the basis gains a field
 _LACKING = 1e-10
-# relative: what of an eigenvalue is round-off, by which it is complex or differs from an equal one
+# relative round-off of an eigenvalue, by which it is complex or differs from an equal one
 _REAL = 1e-9
-# of the highest square that was solved for: the least distance of a mode from it
+# least distance of a mode from the highest square solved for, relative to the latter
 _NEAREST = 1e-3
 
 
@@ -88,7 +88,7 @@ class SpeedRange:
     ) -> None:
         standing, self.rotating, self.gyroscopic = rotating.standing, rotating, gyroscopic
         self._free = standing.free
-        # modes beyond the last of interest, so that those that come down are known before they are among the lowest
+        # further modes, so that falling ones are computed before they are among the lowest
         spare = max(3, count // 2)
         self.count = min(count + spare, self._free.size)
         self._solved_count = min(count + 2 * spare, self._free.size)
@@ -146,7 +146,7 @@ class SpeedRange:
         return np.asarray(change / self._inertia(modes, speed))
 
     def neglected_error(self) -> float:
-        """Return the largest relative error of the frequencies for what the matrices neglect between their speeds."""
+        """Return the largest relative error of the frequencies, due to terms neglected between the matrices' speeds."""
         rotating, shapes = self.rotating, np.zeros((self.count, self.rotating.standing.size))
         if rotating.neglected is None:
             return 0.0

@@ -1,4 +1,4 @@
-"""Where a mode is strained most: the hot spot that a fatigue strength is compared with, and how sure its stress is."""
+"""Hot spot of a mode, where its stress is compared with a fatigue strength, and the error of this stress."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class PeakStress(NamedTuple):
 class HotSpot:
     """The place of a displacement field that exhausts its material most.
 
-    stress       Pa, von Mises, as that of its PeakStress
+    stress       Pa, von Mises, as in its PeakStress
     strength     Pa, of its volume group
     coordinates  m
     group        volume group

@@ -50,13 +50,13 @@ class StressRecovery:
         self._points, self._to_corners = _sampling(cells.shape[1], degree)
 
     def of_cells(self, stress: Any) -> OfCells:
-        """Return what evaluates a UFL stress tensor in cells, with the functions in it as they are when called."""
+        """Return a function that evaluates a UFL stress tensor in cells, with its functions' values when called."""
         components = ufl.as_vector([stress[pair] for pair in _PAIRS])
         sample = fenicsx.sampler(components, self._mesh, self._points)
         return lambda cells: np.einsum("cq,eqi->eci", self._to_corners, sample(cells))
 
     def mean(self, of_cells: OfCells, points: np.ndarray | None = None) -> Callable[[], np.ndarray]:
-        """Return what evaluates the recovered stress (6, k) at places (indices; default: all)."""
+        """Return a function that evaluates the recovered stress (6, k) at places (indices; default: all)."""
         wanted = np.arange(len(self.places)) if points is None else np.asarray(points)
         cells = self.cells_at(wanted)
         corners = self.corners[cells].ravel()

@@ -1,4 +1,4 @@
-"""A growing space of mass-orthonormal vectors, with an operator projected on it: what block eigensolvers share."""
+"""A growing space of mass-orthonormal vectors, with a projected operator: the base of the block eigensolvers."""
 
 from __future__ import annotations
 

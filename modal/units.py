@@ -70,7 +70,7 @@ def size_doubts(size: float) -> tuple[str, ...]:
 
 
 def material_doubts(materials: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
-    """Explain why materials, as those of `doubts`, are implausible; one line, or none."""
+    """Explain why materials (as in `doubts`) are implausible; one line, or none."""
     return _together(_of_materials(materials), "young in Pa, density in kg/m^3")
 
 

@@ -26,7 +26,7 @@ from vanedamp.rom.truncation import massless, truncated
 
 @dataclass(frozen=True)
 class ReductionBasis:
-    """What a basis retains: modes, and the static response of the rest of the structure.
+    """A reduction basis: modes, and the static response of the remaining structure.
 
     held: whether the modes are those with the interface held; attached: blocks of attachment modes of natural modes;
     without_mass: whether the rest is a boundary without mass; more: whether further blocks follow on the attached ones;
@@ -60,7 +60,7 @@ class ReductionBasis:
         self, matrices: SystemMatrices, interface: Interface, modes: int, factorize: Factorize, blocks: int,
         keep_recovery: bool = False,
     ) -> ReducedModel:  # fmt: skip
-        """Return the model from which `cut` takes those up to `modes`, with that many blocks of quasi-static modes.
+        """Return the model from which `cut` takes those with up to `modes`, with that many quasi-static blocks.
 
         With 1 + BLOCKS, it has their error estimates as well (rom.error_estimate); Craig-Bampton models then have one.
         """

@@ -47,7 +47,7 @@ def plain_matrices(model: ReducedModel) -> dict[str, np.ndarray]:
     """Return mass, stiffness, damping (m, m), selection (k, m) and base_load (m, 3) of a model, as other codes take it.
 
     A residual flexibility V diag(s) V^T becomes further coordinates without mass, of stiffness 1 / s, by which the
-    interface moves by V: what `external_model` condenses into the same flexibility again.
+    interface moves by V: `external_model` condenses them into the same flexibility again.
     """
     matrices = {
         name: np.array(getattr(model, name)) for name in ("mass", "stiffness", "damping", "selection", "base_load")

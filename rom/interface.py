@@ -141,7 +141,7 @@ def plane_motion(
 def normal_direction(matrices: SystemMatrices, facets: str | Sequence[str]) -> tuple[float, float, float]:
     """Return the normal of a patch of facets, with the same sign for walls that face each other.
 
-    Its largest component is positive, the first of those within a tenth of the largest. Raises InterfaceError for a
+    Its largest component is positive, the first of all within a tenth of the largest. Raises InterfaceError for a
     patch without a normal, such as a node set or a closed surface.
     """
     normal = np.array(outward_normal(matrices, facets))
@@ -227,7 +227,7 @@ class Interface(Displayed):
     def restrict(self, matrices: SystemMatrices) -> tuple[sparse.csr_array, sparse.csr_array, np.ndarray]:
         """Return stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure.
 
-        Those are what the supports left when the interface was made, also where `matrices` has others.
+        They are the motions left by the supports when the interface was made, even if `matrices` has other supports.
         """
         free = self.motions.nonzero()[0]
 
@@ -282,7 +282,7 @@ def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate, axis: n
 
 
 def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> np.ndarray:
-    """Return the sorted DOFs of all nodes of patches of kind "full", without those at the supports."""
+    """Return the sorted DOFs of all nodes of patches of kind "full", except at the supports."""
     full = {item.facets: item.label for item in coordinates if item.kind == "full"}
     nodes = np.unique(np.concatenate([np.empty(0, np.int64), *(matrices.patch(facets).nodes for facets in full)]))
     dofs = np.setdiff1d((3 * nodes[:, None] + np.arange(3)).ravel(), matrices.fixed)
@@ -295,8 +295,8 @@ def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordina
 def _motions(matrices: SystemMatrices, rigid: Sequence[str | tuple[str, ...]]) -> sparse.csr_array:
     """Return columns for the free DOFs outside rigid patches, then for the motions that the patches can make.
 
-    A single patch makes up to six. Patches with common nodes make those in which these move with both, such as the
-    rotation about a common edge; a patch with nodes at the supports those in which the supports stay at rest.
+    A single patch has up to six. Patches with common nodes have only motions in which these nodes move with both
+    patches, such as the rotation about a common edge. Where a patch has nodes at the supports, these stay at rest.
     """
     free = np.zeros(matrices.size, dtype=bool)
     free[matrices.free] = True

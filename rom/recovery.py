@@ -74,7 +74,7 @@ def with_stresses(
 
 
 def hot_spots(model: ReducedModel) -> dict[str, dict[str, Any]]:
-    """Return what the model's provenance has of the places with outputs of all six components: name -> facts.
+    """Return the data in the provenance on places with outputs of all six components: name -> facts.
 
     coordinates (m), group (of the mesh's volumes), mode (that has its hot spot there: "number", from 1,
     "frequency_hz", and the next), per_amplitude ("at", "von_mises": Pa/m of the first mode, "error": estimated,

@@ -154,7 +154,7 @@ class ReducedModel(Record):
         )
 
     def shown(self) -> dict[str, Any]:
-        """Return what a model prints: the frequencies first."""
+        """Return the printed summary of a model, the frequencies first."""
         first = ", ".join(f"{frequency:.6g}" for frequency in self.natural_frequencies_hz[:_SHOWN])
         return {"frequencies_hz": first + ", ..." * (self.size > _SHOWN)} | super().shown()
 
@@ -217,7 +217,7 @@ class ReducedModel(Record):
 
     @property
     def lengths(self) -> np.ndarray:
-        """(k,) m or 1, what makes displacements of the interface coordinates: the arms of rotations, 1 of others."""
+        """(k,) m or 1, factors from interface coordinates to displacements: the arms of rotations, 1 otherwise."""
         arms = np.zeros(len(self.interface)) if self.arms is None else self.arms
         return np.where(arms > 0.0, arms, 1.0)
 

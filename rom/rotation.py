@@ -98,7 +98,7 @@ class SpeedBases:
         return model
 
     def neglected(self, model: ReducedModel, speeds: Sequence[float], modes: int, count: int) -> float:
-        """Return the relative error of the lowest frequencies for what the matrices neglect between their speeds.
+        """Return the relative error of the lowest frequencies, due to terms neglected between the matrices' speeds.
 
         model: `model` of the same speeds and modes.
         """

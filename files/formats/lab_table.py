@@ -1,4 +1,4 @@
-"""Tables of measurements as text, however a laboratory's program spells them; what leaves two readings is rejected.
+"""Tables of measurements as text, in the spellings of laboratory programs; ambiguous tables are rejected.
 
 Columns stand between semicolons, tabs, commas or blanks. Numbers have decimal points or, unless commas separate
 columns, decimal commas; complex ones have an i or j. Text is UTF-8, UTF-16 or Latin-1. Data begin at the first line of
@@ -25,7 +25,7 @@ from vanedamp.files.formats.lab_units import LabUnit, unit
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
 _REMARK = ("#", "%", "!", "//")
-#: what headers call a column, without its unit
+#: names of columns in headers, without units
 _NAMES = {
     "frequency": r"f|freq\w*|frequen[zc]\w*|omega|ω", "time": r"t|time|zeit", "direction": "direction",
     "amplitude": r"ampl?(itude)?|(half )?swing", "displacement": r"x|displ?(acement)?|weg", "speed": "speed",
@@ -38,7 +38,7 @@ _EXAMPLES = {
     "frequency": "Hz", "time": "s", "phase": "rad", "amplitude": "m", "displacement": "m", "velocity": "m/s",
     "acceleration": "m/s^2", "force": "N", "base_acceleration": "m/s^2", "speed": "m/s",
 }  # fmt: skip
-#: what an amplitude is of, as its header says
+#: kind of an amplitude, by its header
 _KINDS = {
     "pk-pk": r"(?:pk|p|peak)(?:[-_ ]?to[-_ ]?|[-_ ]?)(?:pk|p|peak)", "rms": "rms",
     "pk": r"(?:(?:0|zero)[-_ ]?(?:to[-_ ]?)?)?(?:pk|peak)",
@@ -48,7 +48,7 @@ _KINDS = {
 class Column(NamedTuple):
     """A column: its header, name and unit there, "rms", "pk", "pk-pk" or "" of an amplitude, its place from 0.
 
-    unknown: what the header has in brackets, if that is no unit."""
+    unknown: text in brackets in the header that is not a unit."""
 
     header: str
     name: str
@@ -59,7 +59,7 @@ class Column(NamedTuple):
 
     @property
     def role(self) -> str:
-        """What it holds: by its name, or else by its unit; "" if neither says."""
+        """Role of the column: by its name, or else by its unit; "" if unknown."""
         word = self.name.lower().replace("_", " ")
         if self.kind and not word:
             return "amplitude"
@@ -155,7 +155,7 @@ class LabTable:
         return by_role
 
     def reading(self, taken: Mapping[str, str]) -> str:
-        """Return how the file was read, in words; taken: what was made of headers."""
+        """Return how the file was read, in words; taken: meaning by header."""
         roles = ", ".join(f"{key!r} as {value}" for key, value in taken.items())
         return f"{Path(self.path).name}: {self._spelling}; {roles}"
 
@@ -225,7 +225,7 @@ def number(word: str) -> complex | None:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Return the cells of a line; those between blanks may be complex numbers with blanks around their signs."""
+    """Return the cells of a line; cells between blanks may be complex numbers with blanks around their signs."""
     if separator == " ":
         return re.sub(r"(?<=\S)\s+([-+])\s+(?=\S)|\s+(?=[ij](\s|$))", r"\1", line).split()
     return [word.strip() for word in next(csv.reader([line], delimiter=separator))]
@@ -279,7 +279,7 @@ def _column(header: str, index: int) -> Column:
 
 
 def _role_alone(name: str) -> bool:
-    """Whether a name says what a column is of, and not only which part of a response."""
+    """Whether a name states the quantity of a column, not only which part of a response it is."""
     return Column("", name, None, "", "", 0).role not in ("", "real", "imaginary")
 
 

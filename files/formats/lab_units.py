@@ -24,7 +24,7 @@ _SAME = {
 _RAISED = str.maketrans("⁻⁰¹²³⁴", "-01234")
 _DECIBELS = re.compile(r"[(\[]?\s*db\b[\s,]*(?:\(?\s*re(?:f\b|l\b)?\.?:?\s*(?P<of>.+?))?\s*[)\]]?", re.I)
 _LEVEL = re.compile(r"(?P<size>\d[\d.]*(?:[eE][-+]?\d+)?)?\s*(?P<unit>.+)")
-#: what measured columns are of, by the powers of their units
+#: quantities of measured columns, by the powers of their units
 QUANTITIES: dict[tuple[int, ...], str] = {
     (0, 0, -1, 1): "frequency", (0, 0, 1, 0): "time", (0, 0, 0, 1): "phase", (0, 1, 0, 0): "displacement",
     (0, 1, -1, 0): "velocity", (0, 1, -2, 0): "acceleration", (1, 1, -2, 0): "force", (-1, 0, 2, 0): "receptance",
@@ -33,8 +33,8 @@ QUANTITIES: dict[tuple[int, ...], str] = {
 
 
 class LabUnit(NamedTuple):
-    """A unit: what it is of, one of QUANTITIES, "" for decibels without a reference; factor: in SI, of a phase in rad,
-    of decibels that of their reference."""
+    """A unit; quantity: one of QUANTITIES, "" for decibels without a reference; factor: in SI, of a phase in rad, of
+    decibels the factor of their reference."""
 
     text: str
     quantity: str

@@ -38,7 +38,7 @@ def pyuff() -> Any:
 
 
 def datasets(file: Path) -> list[dict[str, Any]]:
-    """Return the datasets 15, 55, 58 and 2411 of a file. Raises what pyuff raises for a damaged one."""
+    """Return the datasets 15, 55, 58 and 2411 of a file. Raises pyuff's errors for a damaged file."""
     universal = pyuff().UFF(str(file))
     kinds = universal.get_set_types()
     wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58, 2411)))

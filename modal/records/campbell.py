@@ -17,7 +17,7 @@ RPM = 30.0 / np.pi
 
 @dataclass(frozen=True)
 class OrderCrossing:
-    """A natural frequency met by an engine order."""
+    """Crossing of a natural frequency with an engine order."""
 
     mode: int
     """counted from 0"""

@@ -146,7 +146,7 @@ def _characteristic(
     if count == 0:
         return static
     modes = linalg.eigh(condensed, inertia, subset_by_index=[0, min(count + constraints, size) - 1])[1]
-    # in their order, without those that repeat the static displacements and the modes before
+    # in order, without modes that depend on the static displacements and earlier modes
     triangle = np.linalg.qr(linalg.cholesky(inertia) @ np.hstack([static, modes]), mode="r")
     independent = np.flatnonzero(np.abs(np.diag(triangle))[constraints:] > 1e-6)[:count]
     return np.hstack([static, (modes - static @ (labels @ modes))[:, independent]])

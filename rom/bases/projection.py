@@ -103,7 +103,7 @@ def project(
         symmetric_part(recovery.T @ (matrix @ recovery)) for matrix in (matrices.mass, matrices.stiffness)
     )
     free_modes = 0 if squares is None else len(squares)
-    if squares is not None:  # what couples them with the rest, and with each other, is round-off
+    if squares is not None:  # their coupling with the rest, and with each other, is round-off
         lead = slice(basis.shape[1] - free_modes)
         mass = linalg.block_diag(mass[lead, lead], np.eye(free_modes))
         stiffness = linalg.block_diag(stiffness[lead, lead], np.diag(squares))

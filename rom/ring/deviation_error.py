@@ -26,7 +26,7 @@ def deviation_errors(
 ) -> list[float]:
     """Return the largest relative error of the natural frequencies that a ring keeps, for every deviation of SIZES.
 
-    fields (c, n): those of a sector that the ring's coordinates there multiply.
+    fields (c, n): of a sector, multiplied by the ring's coordinates there.
     """
     modes = [_modes(ring, size) for size in SIZES]
     errors = [np.zeros(len(squares)) for squares, _ in modes]

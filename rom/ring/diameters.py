@@ -33,7 +33,7 @@ _POINTS, _REACH = 17, 1.5
 
 @dataclass(frozen=True, eq=False)
 class DeviatingPart:
-    """What of a sector deviates: stiffness and mass (n, n), sparse, such as those of the blade."""
+    """Deviating part of a sector: stiffness and mass (n, n), sparse, such as of the blade."""
 
     stiffness: sparse.csr_array
     mass: sparse.csr_array
@@ -98,7 +98,7 @@ def ring_waves(
 
 
 def _forces(modes: RingModes, part: DeviatingPart) -> np.ndarray:
-    """Return real forces (f, n) that span those of deviations in a sector, on modes of unit strain energy.
+    """Return real forces (f, n) that span the forces of deviations in a sector, on modes of unit strain energy.
 
     The strain energy of the static response to K_p z is at most z K_p z, to M_p z at most z M_p z over the lowest
     squared frequency: what has less of it is left out.

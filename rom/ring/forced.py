@@ -82,7 +82,7 @@ class OrderResponse:
         return largest, where
 
     def _contributions(self, frequencies_hz: np.ndarray, poles: slice | np.ndarray) -> np.ndarray:
-        """Return what some poles contribute to the complex amplitudes (f, N)."""
+        """Return the contribution of some poles to the complex amplitudes (f, N)."""
         s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)
         return np.asarray((1.0 / (s[:, None] - self.poles[poles])) @ self.residues[poles])
 
@@ -177,7 +177,7 @@ def natural_of(
     """
     deviations = deviations or Deviations()
     if isinstance(ring, SectorRing):
-        # a family above those of the model, too, which responds to the same forces
+        # also a family above the model's families, which responds to the same forces
         return OfModel(*ring.natural(deviations, speed, min(ring.modes + ring.sectors, ring.size)))
     mass, stiffness = ring.matrices(deviations, speed)
     squares, shapes = linalg.eigh(stiffness, mass)

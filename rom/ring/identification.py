@@ -108,7 +108,7 @@ def _identified(
 
 
 def _family(ring: RingModel, family: int) -> np.ndarray:
-    """Return the places (N,) of a family's waves among the coordinates of a ring."""
+    """Return the indices (N,) of a family's waves among the coordinates of a ring."""
     diameters = ring.diameters[: ring.modes]
     pairs = [1 + (0 < 2 * number < ring.sectors) for number in range(ring.sectors // 2 + 1)]
     members = [np.flatnonzero(diameters == number)[family * size :][:size] for number, size in enumerate(pairs)]
@@ -159,7 +159,7 @@ def _others(
     ring: RingModel, deviations: np.ndarray, squares: np.ndarray, betas: np.ndarray, members: np.ndarray,
     others: np.ndarray, load: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Return the other waves (m, r), complex, by a load (r,) and what deviations make of a family's (m, N)."""
+    """Return the other waves (m, r), complex, due to a load (r,) and to the deviations' forces on a family (m, N)."""
     added = ring.around("stiffness", deviations)
     rigid = np.diag(ring.squares[others]) + added[np.ix_(others, others)]
     forces = load - betas @ added[np.ix_(members, others)]

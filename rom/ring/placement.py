@@ -22,7 +22,7 @@ _Vectors = Annotated[np.ndarray, Array(("interface", "direction"))]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ReducedRing(Record):
-    """What reduced rings share: N sectors about an axis; sector j is sector 0 turned by 2 pi j / N."""
+    """Base of reduced rings: N sectors about an axis; sector j is sector 0 rotated by 2 pi j / N."""
 
     sectors: int
     """N"""
@@ -90,7 +90,7 @@ class ReducedRing(Record):
         """Return the whole ring in natural modes, with residual flexibility.
 
         squares (m,), shapes (n, m) of the modes in coordinates of the ring; rows (N k, n) of the interface and static
-        (n, N k), the response to its forces; load (n, 3) of the base; added (m, m) damping beside that of the ratio.
+        (n, N k), the response to its forces; load (n, 3) of the base; added (m, m) damping, besides the damping ratio.
         Raises RingError for a ring that can move freely, or is unstable.
         """
         if squares[0] <= 0.0:

@@ -42,8 +42,8 @@ def reduce_ring(
     sector         at standstill
     interface      of one sector, of kinds "average" and "node"
     families       modes of every diameter; or all up to max_frequency, Hz
-    part           what deviates (default: the whole sector)
-    centrifugal    (n, n) kg, what a squared speed adds to the sector's stiffness, with the greatest_speed, rad/s
+    part           the deviating part (default: the whole sector)
+    centrifugal    (n, n) kg, the sector's added stiffness per squared speed, with the greatest_speed, rad/s
     report         called with the number of diameters done, and of all
     basis          "modes": waves of the tuned ring, a RingModel; "sectors": a SectorRing, where each sector has motions
                    of its own, for large deviations and many sectors, at standstill
@@ -82,7 +82,7 @@ def reduce_ring(
         "one_sector": [{"stiffness": size, "frequency": error} for size, error in zip(SIZES, errors, strict=True)],
         "sentence": f"{estimate['sentence']}; of frequencies, if one sector's stiffness changes, {listed}",
     }
-    if basis == "sectors":  # what the waves leave out is in the sectors' own motions
+    if basis == "sectors":  # the sectors' own motions include what the waves omit
         estimate["deviation"] = 2.0 * errors[0] / SIZES[0] ** 2
     return replace(ring, provenance=provenance | {"estimate": estimate})
 

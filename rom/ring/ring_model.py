@@ -138,9 +138,9 @@ class RingModel(ReducedRing):
         )
 
     def added_damping(self, deviations: Deviations) -> np.ndarray | None:
-        """Return the damping (n, n) that deviations add to that of the ratio; None without such deviations.
+        """Return the damping (n, n) that deviations add to the damping ratio's; None without such deviations.
 
-        Of a part as stiff as the sector, the sum over sectors of what they add to is the modal damping of the waves.
+        For a part as stiff as the sector, their sum over sectors is added to the modal damping of the waves.
         """
         damping = deviations.of("damping", self.sectors)
         if not damping.any():

@@ -85,7 +85,7 @@ def _component_modes(
     leading = continued(low, fields[:, low])
     shapes = _independent(leading, stiffness, least) @ fields[:, low]
     turned = (shapes.reshape(len(shapes), len(sector.low), 3) @ sector.turn().T).reshape(shapes.shape)
-    # without all of a face's motion, also what its shapes leave out: else the faces of neighbours would part
+    # without any motion of the faces, even beyond their shapes: otherwise neighbouring faces would separate
     rest = fields - leading - continued(high, fields[:, high])
     rest[:, np.concatenate([low, high])] = 0.0
     motions = [rest, *(_fixed_modes(sector, part, size, inside, max(wave.modes for wave in waves) + 1, factorize)

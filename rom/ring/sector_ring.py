@@ -103,7 +103,7 @@ class SectorRing(ReducedRing):
         return self.natural_model(squares, shapes, rows, factors.solve(rows.T), load, added), shapes
 
     def tuned_families(self, speed: float = 0.0) -> Families:
-        """Return the natural modes of the tuned ring diameter by diameter, and a family above those of `model`.
+        """Return the natural modes of the tuned ring by diameter, and a family above the families of `model`.
 
         Raises RingError for a speed.
         """
@@ -156,14 +156,14 @@ class SectorRing(ReducedRing):
         return stiffness, self._summed(self.mass + lighter * self.part_mass)
 
     def places(self) -> np.ndarray:
-        """Return the places (N, s) of the coordinates of every sector among those of the ring."""
+        """Return the indices (N, s) of the coordinates of every sector among the ring's coordinates."""
         per_sector = len(self.mass) - self.faces
         first = per_sector * np.arange(self.sectors)[:, None]
         face = np.arange(self.faces)
         return np.hstack([first + face, np.roll(first, -1, axis=0) + face, first + np.arange(self.faces, per_sector)])
 
     def _summed(self, blocks: np.ndarray) -> sparse.csr_array:
-        """Return the matrix of the ring from those of the sectors (N, s, s)."""
+        """Return the matrix of the ring from the sectors' matrices (N, s, s)."""
         coordinates = self.places()
         rows, columns = (
             np.broadcast_to(indices, blocks.shape) for indices in (coordinates[:, :, None], coordinates[:, None, :])
@@ -171,7 +171,7 @@ class SectorRing(ReducedRing):
         return sparse.csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), (self.size, self.size))
 
     def _joined(self, rows: np.ndarray, ahead: int = 0) -> sparse.csr_array:
-        """Return functionals (N k, size) of the ring from those of its sectors (N, k, s), or of the sectors ahead."""
+        """Return functionals (N k, size) of the ring from those (N, k, s) of its sectors, or of the sectors ahead."""
         coordinates = np.roll(self.places(), -ahead, axis=0)
         numbers = np.arange(rows.shape[0] * rows.shape[1]).reshape(rows.shape[:2])
         at, columns = (

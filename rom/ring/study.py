@@ -41,11 +41,11 @@ class Amplification(NamedTuple):
 
 
 class DeviationTable(Protocol):
-    """What draws deviations: a scene's or a case's table [mistuning], a dataclass."""
+    """Source of drawn deviations: a scene's or a case's table [mistuning], a dataclass."""
 
     @property
     def seed(self) -> int:
-        """The seed of what is drawn."""
+        """Seed of the draw."""
 
     def deviations(self, sectors: int) -> Deviations:
         """Return deviations of so many sectors."""
@@ -176,7 +176,7 @@ def mistuning_study(
     report   called with the number of draws done, and of all
 
     A ring that rotates turns past a load at rest: forces come earlier from sector to sector, in other rings later.
-    Raises RingError, and what the table raises.
+    Raises RingError, and the table's errors.
     """
     label = ring.interface[0] if label is None else label
     numbers = list(range(table.seed, table.seed + seeds)) if isinstance(seeds, int) else [int(seed) for seed in seeds]
@@ -218,7 +218,7 @@ def mistuning_study(
 
 
 class _PeakScope(NamedTuple):
-    """Where peaks count: at the modes of a family, wherever a draw has them, or in a band, Hz, that is given."""
+    """Where peaks count: at the modes of a family, wherever a draw has them, or in a given band, Hz."""
 
     families: Families
     family: int
@@ -265,7 +265,7 @@ class _Peak(NamedTuple):
     def of(cls, search: _PeakScope, natural: Natural | OfModel, order: int, label: str) -> _Peak:
         """Return the largest peak where peaks count.
 
-        Raises RingError where there is none, or where a band cuts what is larger.
+        Raises RingError where there is none, or where the response is larger at an end of the band.
         """
         response, band = natural.forced(order, label), search.band(natural)
         amplitudes, frequencies = response.peaks(*band, search.modes(natural))

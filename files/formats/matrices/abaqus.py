@@ -1,7 +1,7 @@
 """Matrices of Abaqus: substructures (*USER ELEMENT with *MATRIX) in and out, global ones (*MATRIX OUTPUT) in.
 
 A substructure's file, as *SUBSTRUCTURE MATRIX OUTPUT and CalculiX write it, is the definition of a linear user element:
-the columns of a symmetric matrix from the first row to the diagonal, four entries a line, one column after the other.
+the columns of a symmetric matrix from the first row to the diagonal, four entries per line, one column after another.
 """
 
 from __future__ import annotations

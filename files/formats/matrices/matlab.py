@@ -44,7 +44,7 @@ def _variable(item: h5py.Dataset | h5py.Group) -> Any:
         if "MATLAB_sparse" not in item.attrs:
             return None
         columns, rows = item["jc"][()].astype(int), int(item.attrs["MATLAB_sparse"])
-        empty = "data" not in item  # MATLAB leaves out what is empty
+        empty = "data" not in item  # MATLAB omits empty arrays
         data, indices = (
             (np.empty(0), np.empty(0, int)) if empty else (_complex(item["data"]), item["ir"][()].astype(int))
         )

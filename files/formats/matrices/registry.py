@@ -23,7 +23,7 @@ from vanedamp.files.sparse_indices import within_shape
 
 
 def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Read the dense matrices of a file by lower-case name; where those clash, by their own names.
+    """Read the dense matrices of a file by lower-case name; where these clash, by their own names.
 
     That in .mtx, .npy, .csv, CalculiX's .sti and .mas or scipy's save_npz is "". Several hold .npz, MATLAB's .mat,
     Nastran's OP4, OP2 and DMIG entries (.pch, .dmig), of which all have the same rows, by grid point and component, and
@@ -59,7 +59,7 @@ def row_freedoms(path: str | os.PathLike[str]) -> np.ndarray | None:
 
 
 def read_npz(path: str | os.PathLike[str]) -> Any:
-    """Return the matrix of scipy.sparse.save_npz. Raises what the libraries raise for a damaged file."""
+    """Return the matrix of scipy.sparse.save_npz. Raises the libraries' errors for a damaged file."""
     return within_shape(sparse.load_npz(path))
 
 

@@ -22,11 +22,11 @@ from vanedamp.files.formats.meshes.labelled_mesh import SHELLS, SOLIDS, DeckLine
 _SOLIDS = {5, 45, 62, 64, 65, 70, 72, 73, 87, 90, 92, 95, 96, 98}
 _SOLIDS |= {162, 164, 168, 185, 186, 187, 190, 226, 227, 278, 279, 285}
 _SKINS = (25, 28, 41, 42, 43, 63, 77, 82, 91, 93, 99, 131, 132, 151, 152, 153, 154, 157, 181, 182, 183, 200, 223, 281)
-# those that carry loads or temperatures only
+# elements that carry only loads or temperatures
 _SOFT = (77, 131, 132, 151, 152, 153, 154, 157, 200)
 # an element without stiffness, and its first options that make it a line or a solid
 _MESH, _MESH_LINES, _MESH_SOLIDS = 200, (0, 1, 2, 3), (8, 9, 10, 11)
-# nodes of a brick whose corners fall together: corners first, then those between them
+# nodes of a brick with coincident corners: corners first, then mid-edge nodes
 _SHAPES = {
     "tetra10": [0, 1, 2, 4, 8, 9, 11, 16, 17, 18],
     "pyramid13": [0, 1, 2, 3, 4, 8, 9, 10, 11, 16, 17, 18, 19],

@@ -30,7 +30,7 @@ from vanedamp.files.formats.meshes.labelled_mesh import (
 )
 
 _KINDS = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
-# number of corners, and of all nodes where those between the corners are given
+# number of corners, and of all nodes with mid-edge nodes
 _ELEMENTS = {
     "CTETRA": (4, 10), "CHEXA": (8, 20), "CPENTA": (6, 15), "CPYRAM": (5, 13), "CPYRA": (5, 13),
     "CTRIA3": (3, 3), "CTRIAR": (3, 3), "CTRIA6": (3, 6), "CQUAD4": (4, 4), "CQUADR": (4, 4), "CQUAD8": (4, 8),
@@ -131,14 +131,14 @@ def _take_element(mesh: LabelledMesh, card: _Card) -> None:
 
 
 class _Numbers(NamedTuple):
-    """Numbers of a set: those named, ranges, and those taken out of the ranges."""
+    """Numbers of a set: single numbers, ranges, and numbers excluded from the ranges."""
 
     named: list[int]
     ranges: list[range]
     without: set[int]
 
     def of(self, labels: Iterable[int]) -> list[int]:
-        """Return those named and the labels in the ranges; of a range Nastran takes those that exist."""
+        """Return the single numbers and the existing labels in the ranges, as Nastran does."""
         inside = (n for n in labels if n not in self.without and any(n in span for span in self.ranges))
         return list(dict.fromkeys([*self.named, *inside]))
 

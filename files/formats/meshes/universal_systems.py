@@ -21,7 +21,7 @@ _GLOBAL = (0, 1)
 def systems_of(
     number: int, lines: Iterable[DeckLine], known: Mapping[int, CoordinateSystem]
 ) -> dict[int, CoordinateSystem]:
-    """Return the systems of a dataset by label; known: those of datasets before it, in which 18 may give its points.
+    """Return the systems of a dataset by label; known: systems of earlier datasets, in which 18 may give its points.
 
     Raises MeshError with the line, and StopIteration for a dataset that ends within an entry.
     """
