@@ -81,7 +81,7 @@ class CheckpointFile:
             self.write()
 
     def write(self) -> None:
-        """Write what has changed. Raises StoreError, such as for a full disk."""
+        """Write changes. Raises StoreError, such as for a full disk."""
         if self._path is None or not self._unsaved:
             return
         started = time.perf_counter()

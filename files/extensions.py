@@ -29,7 +29,7 @@ class ExtensionError(VanedampError):
 
 
 class ExtensionPoint(NamedTuple):
-    """Where parts of one kind come from that are loaded all at once.
+    """Source of parts of one kind that are all loaded at once.
 
     A part is a module, or any object with the attributes.
 
@@ -72,7 +72,7 @@ def added_parts(kind: str, group: str) -> dict[str, Any]:
 
 
 class Registry(NamedTuple):
-    """Where parts of one kind come from that are loaded one by one, as they are wanted.
+    """Source of parts of one kind that are loaded one by one when needed.
 
     kind        in words, for messages
     parts       by name: ours, as "package.module" or "package.module:object" until they are loaded, and others

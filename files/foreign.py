@@ -26,7 +26,7 @@ _DEADLY = [
 _Read = TypeVar("_Read")
 #: s of processor time for a fork, and bytes a second beyond them; and how many times as long it may wait
 _PATIENCE, _SPEED, _WAITS = 60, 1e6, 20
-#: bytes that deflate makes of one, at most
+#: most bytes that deflate expands one byte to
 _INFLATED = 1100
 #: bytes that a fork may take, and further ones per byte of its file
 _MEMORY, _PER_BYTE = 2 << 30, 100
@@ -156,7 +156,7 @@ def _answer(read: Callable[[], object], writing: int, seconds: int, memory: int)
 
 
 def _limit_memory(more: int) -> None:
-    """Let this process take so many bytes more than it has: beyond them it has a MemoryError."""
+    """Limit further memory of this process to this many bytes, by a MemoryError."""
     with contextlib.suppress(OSError, ImportError):  # systems without /proc, or without limits
         import resource
 

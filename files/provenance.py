@@ -1,4 +1,4 @@
-"""Which software made a result."""
+"""Software versions of a result."""
 
 from __future__ import annotations
 

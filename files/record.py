@@ -1,4 +1,4 @@
-"""Records by declaration: a field says its dimensions and unit once; file, JSON and data set come from that.
+"""Records by declaration: fields declare dimensions and units once; file, JSON and data set follow.
 
     @dataclass(frozen=True, eq=False, repr=False)
     class Decay(Record):
@@ -231,7 +231,7 @@ class Record(Displayed):
         return declared
 
     def derived(self) -> dict[str, Any]:
-        """Return what JSON has besides the fields, or in place of one."""
+        """Return the entries of JSON besides the fields, or instead of one."""
         return {}
 
     def variables(self) -> dict[str, store.Variable]:
@@ -296,7 +296,7 @@ class Record(Displayed):
             for entry in variables.values()
             for dim, size in zip(entry.dims, np.shape(entry.values), strict=False)
         }
-        for name, entry in variables.items():  # of no rows, arrays have lost their further dimensions
+        for name, entry in variables.items():  # arrays without rows have lost their further dimensions
             if np.ndim(entry.values) < len(entry.dims):
                 shape = [sizes.get(dim, 0) for dim in entry.dims]
                 variables[name] = entry._replace(values=np.reshape(entry.values, shape))
@@ -460,7 +460,7 @@ def joined(columns: Sequence[Mapping[str, np.ndarray]], counts: Sequence[int]) -
 
 
 def _arrays_of(values: Mapping[str, Any], layout: NamedArrays, prefix: str = "") -> dict[str, tuple[Any, Any]]:
-    """Return the arrays of a file that a table knows, with their entries in it, by name."""
+    """Return the arrays of a file that a table lists, with their entries in it, by name."""
     entries = {name: (prefix + layout.prefix + name, entry) for name, entry in layout.table().items()}
     return {name: (values[at], entry) for name, (at, entry) in entries.items() if at in values}
 

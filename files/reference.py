@@ -152,7 +152,7 @@ class _Generator(GenerateJsonSchema):
         return super().default_schema(schema)
 
     def tagged_union_schema(self, schema: core_schema.TaggedUnionSchema) -> JsonSchemaValue:
-        """Return the union, whose tables must say which of its records they are, defaults or not."""
+        """Return the union, whose tables must name their record, even if it is the default."""
         union = super().tagged_union_schema(schema)
         tag = schema["discriminator"]
         if isinstance(tag, str):

@@ -43,7 +43,7 @@ SCHEMA_VERSION = 1
 _TRACK_ORDER = False
 #: name of a dimension without a coordinate in netCDF-4
 _NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
-#: where links stand for the files that processes have open
+#: folder of links to the open files of processes
 _OPEN_FILES = Path("/proc")
 #: the last bytes of a record's file, after HDF5's, which passes over them and drops them at a change
 _SEAL, _SEAL_LENGTH = "\nvanedamp {:08x}\n", 19
@@ -197,7 +197,7 @@ def write_json(path: str | os.PathLike[str], data: Any) -> None:
 
 
 def json_text(data: Any) -> str:
-    """Return finite plain data as JSON. Raises ValueError for nan and infinity, which JSON does not know."""
+    """Return finite plain data as JSON. Raises ValueError for nan and infinity, which JSON lacks."""
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
@@ -370,7 +370,7 @@ def _read_all(path: str | os.PathLike[str], dimensions: bool) -> tuple[dict[str,
 
 
 def _sealed(path: str | os.PathLike[str]) -> bool:
-    """Say whether a file ends with the checksum of its content; records before it was introduced do not.
+    """Whether a file ends with the checksum of its content; records before its introduction do not.
 
     Raises StoreError where the checksum is another's: the file has been damaged since.
     """
@@ -431,7 +431,7 @@ def frozen(array: Any, dtype: Any = float) -> np.ndarray:
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """Return a view of an array that cannot be written through, as frozen records hold what nobody changes any more."""
+    """Return a read-only view of an array, as held by frozen records."""
     view = array.view()
     view.setflags(write=False)
     return view

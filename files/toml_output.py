@@ -21,7 +21,7 @@ from vanedamp.files.reference import FileKind, key_in, options, table_at
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import plain
 
-#: widest line that a comment at its end may make; longer comments stand above
+#: widest line with a comment at its end; longer comments go above
 _WIDTH = 120
 #: width of the lines of a long list
 _LINE = 96

@@ -22,7 +22,7 @@ from vanedamp.modal.records.modes import Modes
 LEAST_MAC = 0.5
 # an affine field has four coefficients; twice as many nodes keep its fit well-posed in all but flat patches
 _NEIGHBOURS = 8
-# of a shape's largest displacement
+# fraction of a shape's largest displacement
 _UNSEEN = 1e-6
 
 
@@ -149,7 +149,7 @@ def observed_shapes(modes: Modes, matrices: SystemMatrices, measured: MeasuredSh
 def measured_mac(modes: Modes, matrices: SystemMatrices, measured: MeasuredShapes) -> np.ndarray:
     """Return the MAC (computed, measured) at the measured degrees of freedom."""
     seen = observed_shapes(modes, matrices, measured)
-    # a mode that does not move what was measured is round-off there, and round-off has the shape of anything
+    # a mode without motion at the sensors is round-off there, which may resemble any shape
     unseen = np.abs(seen).max(axis=1) < _UNSEEN * np.abs(modes.shapes).max(axis=1)
     seen[unseen] = 0.0
     return modal_assurance(seen, measured.shapes)

@@ -171,7 +171,7 @@ class CyclicSector:
         ]
 
     def travels(self, diameter: int) -> bool:
-        """Say whether a nodal diameter has waves of two senses: 0 < h < N / 2."""
+        """Whether a nodal diameter has waves of two senses: 0 < h < N / 2."""
         return 0 < 2 * diameter < self.sectors
 
     def stiffness(self, diameter: int) -> sparse.csr_array:

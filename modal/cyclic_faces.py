@@ -13,7 +13,7 @@ from vanedamp.modal.matrices import SystemMatrices
 
 #: distance of two nodes that are one, over the size of the sector
 TOLERANCE = 1e-6
-# of the size: centres of faces about the right axis are nearer to each other, however the faces are meshed
+# fraction of the size: with the correct axis, centres of the faces are closer than this, however they are meshed
 _SAME_CENTRE = 1e-2
 # degrees between angles that differ
 _ANGLE = 1e-3
@@ -72,7 +72,7 @@ def check_sides(
 
 
 def check_angle(first: np.ndarray, second: np.ndarray, sectors: int, axis: np.ndarray, size: float) -> None:
-    """Raise CyclicError where the centres (3,) of both faces say that axis or number of sectors is wrong.
+    """Raise CyclicError if, by the centres (3,) of both faces, the axis or the number of sectors is wrong.
 
     Centres from a point of the axis, a unit vector; size: of the sector; all in one unit of length.
     """
@@ -99,7 +99,7 @@ def check_angle(first: np.ndarray, second: np.ndarray, sectors: int, axis: np.nd
 
 
 def _check_supports(matrices: SystemMatrices, low: np.ndarray, high: np.ndarray, turn: np.ndarray) -> None:
-    """Raise CyclicError for paired nodes of which one is held where the other one is free."""
+    """Raise CyclicError for paired nodes with different supports."""
     held = np.zeros(matrices.size, dtype=bool)
     held[matrices.fixed] = True
     held = held.reshape(-1, 3)

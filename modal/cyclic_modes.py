@@ -17,7 +17,7 @@ from vanedamp.modal.petsc import one_analysis
 from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.records.ring_modes import RingModes
 
-# of the squared length of a field: less is round-off of fields that the others determine
+# fraction of a field's squared length: smaller ones are round-off of dependent fields
 _DEPENDENT = 1e-12
 
 

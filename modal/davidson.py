@@ -21,11 +21,11 @@ _ROUNDS = 300
 _AT_ONCE = 4
 # round-off of an entry of a residual, relative to the product on the diagonal
 _ROUND_OFF = 64.0 * np.finfo(float).eps
-# rounds in which an estimate has not halved; then it has converged if it is within so many times its round-off
+# rounds without halving of an estimate, after which it has converged within this multiple of its round-off
 _STALE, _NEAR = 10, 1e4
-# relative change of an eigenvalue after which a converged pair is another one
+# relative change of an eigenvalue above which a converged pair is a different one
 _SAME = 1e-10
-# directions shorter than this, relative, are round-off
+# relative length below which directions are round-off
 _DEPENDENT = 1e-12
 
 

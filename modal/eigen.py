@@ -21,7 +21,7 @@ __all__ = [
     "stable", "stable_share", "static_shape", "static_solver",
 ]  # fmt: skip
 
-# of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
+# relative to the lowest straining eigenvalue: below all elastic modes, and far enough from rigid ones to factorise
 _SHIFT = -1e-4
 #: further modes among which a gap is sought where modes are counted; the least relative gap
 SPARE = 3
@@ -201,7 +201,7 @@ def _within(
     if iteration is not None:
         return values, vectors
     if count <= _SLICE:
-        # the eigenvalues nearest to the middle of an interval are those inside
+        # the eigenvalues nearest to the middle of an interval are inside it
         values, vectors = petsc.nearest_eigenpairs(*pencil, count, 0.5 * (lower + upper) if low_hz else floor)
         if np.all((values > lower) & (values < upper)):
             return values, vectors

@@ -26,7 +26,7 @@ from vanedamp.modal.statics import Statics
 # are; largest ratio of two steps for which older factors serve
 _STEP, _NONE, _SLOW = 1e-6, 1e-10, 0.2
 _MOST_STEPS = 12
-# of the size of the body: displacements of one that has left its shape
+# fraction of the body's size: larger displacements mean that Newton's method diverges
 _GONE = 0.2
 
 
@@ -91,7 +91,7 @@ class Deformation:
         stresses = [self.geometric(shape) for shape in shapes]
         geometric = _quadratic(stresses[1] - stresses[0], stresses[2] - stresses[0])
         start = self.deformed(initial)
-        # of an even and an odd polynomial of fourth degree, whose values at 1/2 and 1 say all
+        # even and odd part of a polynomial of fourth degree, from its values at 1/2 and 1
         ahead, behind = (
             [self.deformed(initial + a * linear + a**2 * squared) - start for a in (side * 0.5, side)]
             for side in (1.0, -1.0)

@@ -1,4 +1,4 @@
-"""The one file that knows dolfinx's API, from 0.5.2 to 0.11, in serial.
+"""The only file that uses dolfinx's API, from 0.5.2 to 0.11, in serial.
 
 Differences between the versions are settled here; the rest of the package sees meshes with named groups, and UFL forms
 that become scipy matrices.
@@ -49,7 +49,7 @@ _UNNAMED = "unnamed"
 
 
 class CompilerError(VanedampError):
-    """A machine on which no form can be compiled; the message says what is missing."""
+    """A machine on which no form can be compiled; the message names the missing part."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,13 +29,13 @@ _LIMITS = (_TOLERANCE, _TOLERANCE**0.5, 0.1)
 _SHIFT = 10.0
 # bytes of the factor of a compact block of n DOFs, over n^(4/3): 20 numbers, by METIS (19,494 and 56,862 DOFs)
 _FACTOR = 160.0
-# part of the memory that a factor may take: matrices, workspace and the count of modes need as much again
+# fraction of the memory that a factor may take: matrices, workspace and the count of modes need as much again
 _PART = 0.5
-# where a container says how much memory it may have
+# files with the memory limit of a container
 _LIMIT_FILES = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
-# of a motion at the fixed DOFs, squared and on average, that is round-off
+# mean squared motion at the fixed DOFs that is round-off
 _ALLOWED = 1e-20
-# modes that a range of frequencies is first tried with
+# number of modes first tried for a range of frequencies
 _FIRST = 10
 
 

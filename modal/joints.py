@@ -8,9 +8,9 @@ from scipy.spatial import cKDTree
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.records.modes import Modes
 
-# of the largest extent: nodes nearer than this lie at one place
+# fraction of the largest extent: nodes closer than this coincide
 _SAME = 1e-6
-# fraction of a mode that may differ from a motion of a rigid body
+# fraction by which a mode may differ from a rigid motion
 _STRAINED = 1e-3
 
 

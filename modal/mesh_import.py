@@ -217,7 +217,7 @@ def _bricks(points: np.ndarray, cells: np.ndarray) -> tuple[_Shape, np.ndarray, 
     """Return shape, cells and points of bricks with 20 or 27 nodes, where curved with 27.
 
     The nodes that a 20-node brick lacks are put where its own shape functions have them: the shape stays the same, and
-    a dolfinx geometry knows no 20-node brick.
+    dolfinx has no geometry with 20-node bricks.
     """
     positions = points[cells]
     corners, middles = positions[:, :8], positions[:, 8:20]
@@ -307,7 +307,7 @@ def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] 
                 f"{source.path}: {len(faces) - covered.size} of the {len(faces)} faces of {name!r} are no outer facets "
                 "of the volume elements; take them out of the set"
             )
-        groups[name] = np.unique(covered)  # which says more than a node set of that name
+        groups[name] = np.unique(covered)  # more precise than a node set of that name
     lower = {name: np.empty(0, dtype=int) for dimension in (0, 1) for name in source.covers[dimension]}
     return _wanted(source, lower | groups, wanted, "set or surface")
 

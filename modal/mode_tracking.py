@@ -1,4 +1,4 @@
-"""Which mode is which from speed to speed: by the MAC of neighbours, and speeds put in where that is ambiguous.
+"""Modes tracked from speed to speed, by the MAC of neighbours, with further speeds where this is ambiguous.
 
 Two modes whose frequencies approach each other either cross, each keeping its shape, or veer: they turn away from each
 other and exchange their shapes on the way (Leissa 1974; Perkins and Mote 1986, J. Sound Vib. 106). Between coarse
@@ -40,7 +40,7 @@ class Tracks:
         self._least = _CLOSEST * float(speeds[-1] - speeds[0])
         self.notes: list[str] = []
         first = source.modes(float(speeds[0]))
-        # its multiple modes stand as they part
+        # its multiple modes are oriented as they separate
         self.states = [self._aligned(first, source.modes(float(speeds[0]) + 100.0 * self._least))]
         self.number = [np.arange(first.frequencies.size)]
         for speed in speeds[1:]:

@@ -27,18 +27,18 @@ from vanedamp.modal.records.modes import Modes
 LIMIT = 0.02
 #: relative error of the measured frequencies for which deviations of the factors are given
 FREQUENCY_ERROR = 1e-3
-#: relative misses of a tuned frequency: up to the first measurements scatter, from the second on a warning, beyond the
-#: third the modes are not the measured ones
+#: relative errors of a tuned frequency: scatter of measurements up to the first, a warning above the second, wrong
+#: modes above the third
 _SCATTER, _DOUBTFUL, _MISSED = FREQUENCY_ERROR, 0.01, 0.05
-#: of the sum of squared misses, or of the logarithms of factors: another pairing with less than this is better
+#: another pairing is better below this fraction of the sum of squared errors, or of squared logarithms of factors
 _BETTER = 0.1
-#: pairings that are tried in place of one that misses the frequencies
+#: number of other pairings tried if the frequencies are not met
 _PAIRINGS = 4
-# further modes that are computed, so that one that moves up is not lost
+# further modes that are computed, so that a rising mode is not lost
 _SPARE = 4
-#: part of the stiffness below which the rest is round-off of the assembly
+#: fraction of the stiffness that may be round-off of the assembly
 _ROUND_OFF = 1e-12
-# of the largest singular value of the sensitivities: below it two factors do the same to all frequencies
+# relative to the largest singular value of the sensitivities: below it, two factors have the same effect
 _ALIKE = 1e-6
 
 
@@ -341,7 +341,7 @@ class _Problem:
         if self._first is not None:
             return self._first.scaled(float(np.exp(point[0])), self._first.indices, self.target)
         self.evaluations += 1
-        shapes: np.ndarray | None = None  # of an evaluation that was kept they are not known
+        shapes: np.ndarray | None = None  # not stored with earlier evaluations
 
         def solved() -> Arrays:
             nonlocal shapes

@@ -157,7 +157,7 @@ def nearest_eigenpairs(
 
 
 def has_cholmod() -> bool:
-    """Say whether this PETSc is built with SuiteSparse."""
+    """Whether this PETSc is built with SuiteSparse."""
     return bool(PETSc.Sys.hasExternalPackage("suitesparse"))
 
 
@@ -345,7 +345,7 @@ class _Analysed(NamedTuple):
     matrix: Any
 
     def fits(self, matrix: Any) -> bool:
-        """Say whether a matrix has the same pattern."""
+        """Whether a matrix has the same pattern."""
         return all(map(np.array_equal, self.matrix.getRowIJ(), matrix.getRowIJ()))
 
     def destroy(self) -> None:

@@ -104,7 +104,7 @@ def motion_along(shape: np.ndarray, along: np.ndarray, functional: np.ndarray) -
 
 
 def _moves(displacement: float, functional: np.ndarray, shape: np.ndarray) -> bool:
-    """Say whether a patch moves: its displacement is then of the order of the shape's own."""
+    """Whether a patch moves: its displacement is then of the order of the shape's."""
     return abs(displacement) >= 1e-9 * np.abs(functional).sum() * np.abs(shape).max() and displacement != 0.0
 
 

@@ -19,7 +19,7 @@ from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
 from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.rotating import RotatingMatrices
 
-# of the unit length of a shape: missing part of it for which the basis gains a field
+# part of a shape of unit length missing in the basis, above which it is added
 _LACKING = 1e-10
 # relative round-off of an eigenvalue, by which it is complex or differs from an equal one
 _REAL = 1e-9

@@ -13,7 +13,7 @@ from scipy.spatial import QhullError, cKDTree
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 
-# of the size of the points: places so near outside their hull take the temperature of the nearest point
+# fraction of the points' extent: up to this outside their hull, the temperature of the nearest point holds
 _OUTSIDE = 0.01
 
 

@@ -18,7 +18,7 @@ from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom import checks
 from vanedamp.rom.reduced import ReducedModel
 
-# of the largest entry or eigenvalue: other codes write 5 to 9 digits, of which the last are not symmetric
+# relative to the largest entry or eigenvalue: other codes write 5 to 9 digits, the last of which are not symmetric
 _ASYMMETRY = 1e-6
 _INDEFINITE = 1e-6
 

@@ -17,11 +17,11 @@ from vanedamp.rom.reduced import NORMAL, ROTATION
 
 KINDS = ("average", "rigid", "node", "full")
 MOTIONS = ("translation", "rotation")
-# of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
+# relative to the largest singular value: below it, a functional or a patch's rigid motion depends on the others
 _DEPENDENT = 1e-10
-# the same of the constraints between rigid patches: an edge, straight within that fraction of its length, is a hinge
+# same for constraints between rigid patches: an edge, straight within this fraction of its length, is a hinge
 _STRAIGHT = 1e-5
-# a shorter mean normal belongs to a closed surface, or to several surfaces that face apart
+# a shorter mean normal belongs to a closed surface, or to surfaces that face different ways
 _FLAT, _ONE_WAY = 0.5, 0.9
 # sine of the least angle between the directions along and across that span a plane
 _APART = 0.5**0.5

@@ -88,7 +88,7 @@ def hot_spots(model: ReducedModel) -> dict[str, dict[str, Any]]:
     for spot in spots:
         if {f"{spot}.{component}" for component in COMPONENTS} <= set(model.outputs):
             facts = recorded.get(spot, {})
-            # of files before version 0.3 the coordinates only
+            # files before version 0.3 have only coordinates
             facts_of[spot] = dict(facts) if isinstance(facts, Mapping) else {"coordinates": list(facts)}
     return facts_of
 

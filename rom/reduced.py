@@ -88,9 +88,9 @@ class ReducedModel(Record):
     """of interface coordinates that are rotations (rad) the radius of gyration of their patch, zeros for displacements;
     None: all are displacements"""
     centrifugal_stiffness: Annotated[np.ndarray | None, Array(_SQUARE, "kg")] = None
-    """what a squared speed (rad/s) adds to the stiffness; None: does not rotate"""
+    """added stiffness per squared speed (rad/s); None: does not rotate"""
     higher_stiffness: Annotated[np.ndarray | None, Array(("power", *_SQUARE), "N/m")] = None
-    """what the 4th, 6th, ... power of the speed over the greatest adds; or None"""
+    """added stiffness per 4th, 6th, ... power of the speed over the greatest; or None"""
     rotation_axis: Annotated[np.ndarray | None, Array(("axis",))] = None
     """unit vector, with rotation_point the axis that it rotates about; or None"""
     rotation_point: Annotated[np.ndarray | None, Array(("axis",), "m")] = None

@@ -24,9 +24,9 @@ class OrderCrossing:
     order: float
     """periods per revolution"""
     speed: Annotated[float, NumberUnit("rad/s")]
-    """where they meet"""
+    """speed of the crossing"""
     frequency_hz: Annotated[float, NumberUnit("Hz")]
-    """of both"""
+    """frequency of the crossing"""
 
     @property
     def rpm(self) -> float:
@@ -50,9 +50,9 @@ class Approach:
     second: int
     """mode of higher frequency before it"""
     speed: Annotated[float, NumberUnit("rad/s")]
-    """where they approach"""
+    """speed of the closest approach"""
     frequency_hz: Annotated[float, NumberUnit("Hz")]
-    """middle of the two"""
+    """mean of the two frequencies"""
     gap_hz: Annotated[float, NumberUnit("Hz")]
     """their distance; zero at a crossing"""
     exchange: float
@@ -71,7 +71,7 @@ class Campbell(Record, Plotted):
 
     KIND: ClassVar[str] = "campbell"
     speeds: Annotated[np.ndarray, Array(("speed",), "rad/s", name="speed")]
-    """ascending: those asked for and those that following the modes took"""
+    """ascending: speeds asked for, and speeds added to follow the modes"""
     asked: Annotated[np.ndarray, Array(("speed",), dtype=bool)]
     """whether a speed was asked for"""
     modes: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="mode")]
@@ -89,13 +89,13 @@ class Campbell(Record, Plotted):
     crossings: Annotated[tuple[OrderCrossing, ...], RecordRows("crossing")]
     """with the engine orders, by speed"""
     approaches: Annotated[tuple[Approach, ...], RecordRows("approach")]
-    """of two modes: veerings and crossings"""
+    """veerings and crossings of two modes"""
     gyroscopic: bool = False
     """whether the modes have the gyroscopic coupling"""
     operating: tuple[float, float] | None = None
     """lowest and highest speed of operation, to which crossings have a margin; None: not known [rad/s]"""
     warnings: tuple[str, ...] = ()
-    """where modes could not be followed, or are not among those computed"""
+    """where modes could not be followed, or were not computed"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     diameters: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="diameter")] = field(default_factory=empty)
     """of a ring, nodal diameters of the modes, -h of the wave that runs with the turn; else empty"""

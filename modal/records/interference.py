@@ -23,7 +23,7 @@ from vanedamp.modal.records.ring_modes import RingModes
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Interference(Record, Plotted):
-    """Modes of a ring, and the engine orders that meet them."""
+    """Modes of a ring, and the engine orders that excite them."""
 
     KIND: ClassVar[str] = RingModes.KIND
     IN_JSON = ("modes",)
@@ -32,17 +32,17 @@ class Interference(Record, Plotted):
     orders: Annotated[tuple[int, ...], Array(("engine_order",), dtype=np.int64, name="engine_order")] = ()
     """engine orders that are considered, whole numbers from 1; without any 1 to N"""
     speed: Annotated[float | None, Named("at_speed")] = None
-    """of rotation; None: the ring does not turn [rad/s]"""
+    """speed of rotation; None: the ring does not rotate [rad/s]"""
     operating: Annotated[tuple[float, float] | None, Array(("edge",), "rad/s", attribute=True)] = None
     """lowest and highest speed of operation; None: not known"""
     speeds: Annotated[np.ndarray, Array(("speed",), "rad/s", name="speed")] = field(default_factory=empty)
-    """ascending, of a Campbell diagram; empty: frequencies are taken as those of all speeds"""
+    """speeds of a Campbell diagram, ascending; empty: frequencies do not depend on the speed"""
     over_speed_hz: Annotated[np.ndarray, Array(("mode", "speed"), "Hz", name="frequency_over_speed")] = field(
         default_factory=empty
     )
-    """frequencies there; nan where a mode is not among those computed"""
+    """frequencies at `speeds`; nan where a mode was not computed"""
     crossings: Annotated[tuple[OrderCrossing, ...], RecordRows("crossing")] = ()
-    """of the orders and the modes of the diagram"""
+    """crossings of orders and modes in the diagram"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

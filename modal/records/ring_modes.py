@@ -27,7 +27,7 @@ class RingModes(Record):
     axis: Annotated[np.ndarray, Array(("axis",), attribute=True)]
     """unit vector"""
     point: Annotated[np.ndarray, Array(("axis",), "m", attribute=True)]
-    """of the axis"""
+    """a point of the axis"""
     diameters: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="diameter")]
     """h. With gyroscopic coupling h > 0 is the wave against the turn about the axis, -h the one with it, each with its
     own frequency"""
@@ -36,7 +36,7 @@ class RingModes(Record):
     frequencies_hz: Annotated[np.ndarray, Array(("mode",), "Hz", name="frequency", json="frequency_hz")]
     """natural frequencies"""
     residuals: Annotated[np.ndarray, Array(("mode",), name="residual")]
-    """as those of `modes.Modes`"""
+    """as in `modes.Modes`"""
     shapes: Annotated[np.ndarray, Array(("mode", "dof"), "kg^-0.5", dtype=complex, name="shape")]
     """z on sector 0, x, y and z of every node in turn. The modal mass over the ring is 1: N z^H M z = 1 for h = 0 and
     N / 2 (real z), and (N / 2) z^H M z = 1 else. Its largest component is real and positive"""

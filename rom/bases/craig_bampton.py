@@ -173,7 +173,7 @@ class _Supported:
     """A structure that its supports hold: from the factors of its own stiffness; constraint: (n, k) constraint modes.
 
     The response with the interface held is the one without, less the constraint modes' part of it. That cancels digits
-    where the supports are much softer than the structure; `error` says how exact it is, relative to 1.
+    where the supports are much softer than the structure; `error` is its relative error.
     """
 
     def __init__(self, stiffness: sparse.csr_array, vectors: np.ndarray, factorize: Factorize) -> None:
@@ -217,7 +217,7 @@ def _fixed_interface_modes(held: _Supported | _Bordered, mass: sparse.csr_array,
     """Return mass-normalised modes (n, modes), by frequency; count: of the held functionals.
 
     The inverse of the held stiffness maps into W^T q = 0 and is self-adjoint in the inner product of the mass, so that
-    Lanczos on it finds the held modes and never sees the interface; small structures are solved densely.
+    Lanczos on it finds the modes with the interface held; small structures are solved densely.
     """
     size = mass.shape[0]
     if not 0 <= modes <= size - count:

@@ -18,12 +18,12 @@ from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.interface import Interface, rigid_basis
 from vanedamp.rom.reduced import ReducedModel
 
-# of the squared frequency of uniform strains: a motion below it does not strain
+# relative to the squared frequency of uniform strains: motions below it are rigid
 _RIGID = 1e-9
 
 
 class ReductionError(VanedampError):
-    """A structure that cannot be reduced as asked; the message says what to change."""
+    """A structure that cannot be reduced as asked; the message names the remedy."""
 
 
 class Solver(Protocol):

@@ -25,7 +25,7 @@ from vanedamp.rom.ring.deviations import RingError
 
 # relative change of a squared frequency, per squared deviation, that static responses to deviations may leave out
 _LEFT_OUT = 1e-5
-# of the strain energy of a static response to the interface: below it the others determine it
+# fraction of the strain energy of a static response to the interface: below it, the response depends on others
 _DEPENDENT = 1e-9
 # points of the receptance, and where they end: over the first family, if the last one reaches so far
 _POINTS, _REACH = 17, 1.5
@@ -101,7 +101,7 @@ def _forces(modes: RingModes, part: DeviatingPart) -> np.ndarray:
     """Return real forces (f, n) that span the forces of deviations in a sector, on modes of unit strain energy.
 
     The strain energy of the static response to K_p z is at most z K_p z, to M_p z at most z M_p z over the lowest
-    squared frequency: what has less of it is left out.
+    squared frequency: forces with less energy are left out.
     """
     omegas, fields = 2.0 * np.pi * modes.frequencies_hz, np.vstack([modes.shapes.real, modes.shapes.imag])
     lowest, spans = omegas.min(), []

@@ -24,7 +24,7 @@ from vanedamp.rom.ring.ring_model import RingModel
 
 _ROUNDS = 30
 _CONVERGED = 1e-10
-# of the largest singular value: a sector that no measured motion strains leaves the equations without its deviation
+# relative to the largest singular value: the deviation of a sector that is never strained cannot be identified
 _UNSEEN = 1e-8
 
 
@@ -45,7 +45,7 @@ class Identified(Record):
     errors: Annotated[np.ndarray, Array(("sector",), name="error")]
     """their standard deviations, from the misfit; nan without more equations than deviations"""
     misfit: float
-    """root mean square of what the equations leave, relative to omega^2 beta"""
+    """root mean square of the equations' residual, relative to omega^2 beta"""
     force: _Force = 0j
     """per unit of the responses' load as given, complex; 0 for natural modes [N]"""
     provenance: Mapping[str, Any] = field(default_factory=dict)

@@ -29,7 +29,7 @@ class ReducedRing(Record):
     axis: Annotated[np.ndarray, Array(("direction",))]
     """unit vector"""
     point: Annotated[np.ndarray, Array(("direction",), "m")]
-    """of the axis"""
+    """a point of the axis"""
     modes: int
     """number of natural modes of the ring that `model` keeps"""
     interface: Annotated[tuple[str, ...], Array(("interface",), dtype=object)]
@@ -39,17 +39,17 @@ class ReducedRing(Record):
     directions: _Vectors
     """this and the next three: as in ReducedModel, of sector 0"""
     normals: _Vectors
-    """across them, towards the bodies"""
+    """transverse to them, towards the bodies"""
     positions: Annotated[np.ndarray, Array(("interface", "direction"), "m")]
-    """places"""
+    """coordinates"""
     arms: Annotated[np.ndarray, Array(("interface",), "m")]
     """distances of bodies from the interface"""
     base_load: _Load
-    """of sector 0, by an acceleration of the base along x, y, z of its frame"""
+    """load of sector 0 by an acceleration of the base along x, y, z of its frame"""
     part_load: _Load
-    """what the part that deviates has of it"""
+    """load of the deviating part"""
     damping_ratio: float
-    """of every mode"""
+    """damping ratio of every mode"""
     provenance: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     """where the numbers come from (JSON-able); "estimate": of the error"""
 

@@ -47,7 +47,7 @@ def reduce_ring(
     report         called with the number of diameters done, and of all
     basis          "modes": waves of the tuned ring, a RingModel; "sectors": a SectorRing, where each sector has motions
                    of its own, for large deviations and many sectors, at standstill
-    higher         (n, n) N/m each, what the 4th, 6th, ... power of a speed over the greatest adds
+    higher         (n, n) N/m each, added stiffness per 4th, 6th, ... power of a speed over the greatest
 
     The estimate of the error is `estimate` of the provenance: `receptance` of the interface, up to 1.5 times the first
     family's frequencies or the last family's lowest; `deviation`, of squared frequencies per squared deviation;

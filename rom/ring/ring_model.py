@@ -34,15 +34,15 @@ class RingModel(ReducedRing):
     squares: Annotated[np.ndarray, Array(("coordinate",), "rad^2/s^2")]
     """squared angular frequencies of the tuned ring at standstill"""
     stiffness: Annotated[np.ndarray, Array(SQUARE, "N/m")]
-    """of the part of a sector that deviates, in sector 0's fields"""
+    """stiffness of the deviating part of a sector, in sector 0's fields"""
     mass: Annotated[np.ndarray, Array(SQUARE, "kg")]
-    """of that part"""
+    """mass of that part"""
     centrifugal_stiffness: Annotated[np.ndarray | None, Array(SQUARE, "kg")] = None
-    """of the whole ring: what a squared speed (rad/s) adds; None: it does not rotate"""
+    """of the whole ring: added stiffness per squared speed (rad/s); None: it does not rotate"""
     higher_stiffness: Annotated[np.ndarray | None, Array(("power", *SQUARE), "N/m")] = None
     """of the whole ring: as in ReducedModel"""
     greatest_speed: float = 0.0
-    """up to which the waves hold [rad/s]"""
+    """speed up to which the waves hold [rad/s]"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -47,9 +47,9 @@ class SectorRing(ReducedRing):
     spring_high: _Stretch
     """with the next: stretch of springs between neighbours, spring_high q_j - spring_low q_(j+1)"""
     spring_low: _Stretch
-    """the same of the face low"""
+    """same for the face low"""
     spring_stiffness: Annotated[np.ndarray, Array(("spring",), "N/m")]
-    """of these springs"""
+    """stiffness of these springs"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

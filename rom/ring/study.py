@@ -69,11 +69,11 @@ class MistuningStudy(Record):
     orders: Annotated[np.ndarray, Array(_OverOrders, dtype=np.int64)]
     """engine orders"""
     seeds: Annotated[np.ndarray, Array(("seed",), dtype=np.int64)]
-    """of the draws"""
+    """seeds of the draws"""
     band_hz: Annotated[np.ndarray, Array(("edge",), "Hz")]
-    """between which peaks count: of all draws"""
+    """band in which peaks count, over all draws"""
     tuned_amplitude: Annotated[np.ndarray, Array(_OverOrders, "m/N")]
-    """largest of the tuned ring"""
+    """largest amplitude of the tuned ring"""
     tuned_frequency_hz: Annotated[np.ndarray, Array(_OverOrders, "Hz")]
     """where it is"""
     amplification: Annotated[np.ndarray, Array(_OverDraws)]
@@ -85,15 +85,15 @@ class MistuningStudy(Record):
     participation: Annotated[np.ndarray, Array(_OverDraws)]
     """sectors that take part in the response there: 1 to N"""
     frequencies_hz: Annotated[np.ndarray, Array(("frequency",), "Hz")]
-    """of the responses that follow"""
+    """frequencies of the following responses"""
     amplitude: Annotated[np.ndarray, Array(("order", "frequency", "sector"), "m/N")]
-    """of the first draw"""
+    """amplitude of the first draw"""
     amplitude_tuned: Annotated[np.ndarray, Array(("order", "frequency"), "m/N")]
-    """of the tuned ring"""
+    """amplitude of the tuned ring"""
     stiffness: _OfDraw
     """deviations of the first draw"""
     mass: _OfDraw
-    """the same of its masses"""
+    """mass deviations of the first draw"""
     damping: _OfDraw
     """the same of its damping"""
     provenance: Mapping[str, Any] = field(default_factory=dict)

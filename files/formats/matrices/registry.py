@@ -1,4 +1,4 @@
-"""Which reader takes a matrix file: by its ending."""
+"""Readers of matrix files, by their endings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which reader takes a mesh file: by its ending."""
+"""Readers of mesh files, by their endings."""
 
 from __future__ import annotations
 
