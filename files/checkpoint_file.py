@@ -1,7 +1,7 @@
-"""A file that a long command keeps while it works, and from which the same command resumes after a kill.
+"""Checkpoint of a long command, from which the same command resumes after it was killed.
 
-Each write makes a new file, which takes the place of the old one when it is complete, so that a kill at any moment
-leaves one that can be read. Writing takes at most a hundredth of the time.
+Each write makes a new file, which replaces the old one when it is complete, so that a readable file remains
+whenever the command is killed. Writing takes at most 1 % of the time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SHARE = 100
 
 
 class CheckpointFile:
-    """The checkpoint of one command (path None: nothing is kept), a context manager: it writes the rest as it ends.
+    """The checkpoint of one command (path None: nothing is stored), a context manager that writes at its end.
 
     kind: of its record; belongs: by attribute the input that it belongs to, and its name in messages; content:
     returns variables and further attributes of the record, and how much is finished, in words.

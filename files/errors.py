@@ -12,7 +12,7 @@ _WORD, _MESSAGE = 500, 4000
 class VanedampError(ValueError):
     """Bad input: a file, an argument or a combination of them that cannot be used.
 
-    Every error class of this project derives from it. The message is one line: what, where, and what would be right.
+    Base of all error classes of this project. The message is one line: the fault, its place, and the remedy.
     Any other exception is a fault of the program.
     """
 

@@ -41,8 +41,8 @@ class Key(NamedTuple):
 class KeyTable(NamedTuple):
     """A table of a file.
 
-    path: dotted, `excitation.harmonic`; heading: as it stands in the file, `[[excitation.harmonic]]`; variant: the
-    value of the key that tells tables of one name apart, such as a method's, "" without one; text: its meaning.
+    path: dotted, `excitation.harmonic`; heading: as in the file, `[[excitation.harmonic]]`; variant: the value of the
+    key that distinguishes tables of one name, such as a method's, "" without one; text: its meaning.
     """
 
     path: str

@@ -67,7 +67,7 @@ class Array(NamedTuple):
 class RecordRows(NamedTuple):
     """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `NumberUnit`s.
 
-    Those that have defaults are left out where all rows have all of these.
+    Fields with defaults are omitted if all rows have these.
     """
 
     dim: str
@@ -89,7 +89,7 @@ class NamedArrays(NamedTuple):
 class Ragged(NamedTuple):
     """A tuple of dataclasses with declared fields, each with rows of its own number along `dim`.
 
-    The rows of all stand one after the other, and "<thing>_of_<dim>" says whose each is. What has no rows is a variable
+    The rows of all follow one another, and "<thing>_of_<dim>" has the owner of each. Fields without rows are variables
     along `thing`; RecordRows have "<dim of the rows>_<thing>" in the same way. prefix: of names and `dim` in the file.
     """
 

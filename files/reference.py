@@ -37,9 +37,9 @@ making_schema = ContextVar("making_schema", default=False)
 class FileKind(NamedTuple):
     """A kind of input file.
 
-    name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds;
+    name; place: of its record, "module:class", loaded when needed; tables: tables that distinguish it from other kinds;
     completed: "module:function" that takes the schema of the record and adds other ways to write the same, "": none;
-    command: that such a file is for in the first place, "": of its name.
+    command: main command for such a file, "": of its name.
     """
 
     name: str

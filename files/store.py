@@ -1,6 +1,6 @@
 """Records on disk: one HDF5 layout for every result, readable by xarray and netCDF tools; tables and plain data.
 
-The ground floor of the project: it knows h5py and nothing else of ours, so that every stage may write its records the
+The lowest layer of the project: it imports h5py and no other folder, so that every stage may write its records the
 same way. A record is a set of named variables with dimensions and units, and flat attributes. h5py takes 12 MB: it is
 imported where a file is read or written.
 Dimension scales take ten lines of h5py; h5netcdf 1.8.2 would replace these only, as another dependency, and writes a

@@ -1,8 +1,8 @@
 """Pulse of one collision of a body with a wall of the structure, and its error due to omitted modes.
 
-The modes are at rest and the body comes with unit speed. While they touch, body, contact and modes are one linear
-system, and the pulse is a sum of exponentials until the contact's force vanishes. The excited motion responds to
-its Fourier transform at the excitation frequency: the impulse, and with its phase the moment at which it acts.
+The modes are at rest, and the body arrives at unit speed. During contact, body, contact and modes are one linear
+system, and the pulse is a sum of exponentials until the contact force vanishes. The excited motion responds to its
+Fourier transform at the excitation frequency, which gives the impulse and, by its phase, the instant of action.
 
 Needs numpy and scipy only.
 """

@@ -43,8 +43,8 @@ class LadderError(VanedampError):
 class Rung:
     """A model of the hierarchy with its estimated errors, relative: of the receptance, of the pulses of collisions.
 
-    above: fraction of a collision's energy that modes beyond the model's would take, which need not be an error;
-    attached: whether the modes come with residual attachment modes (ReducedModel.attached).
+    above: fraction of a collision's energy that modes beyond the model would take, which is not necessarily an error;
+    attached: whether the model has residual attachment modes (ReducedModel.attached).
     """
 
     modes: int

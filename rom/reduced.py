@@ -1,4 +1,4 @@
-"""ReducedModel: small dense M, C, K with labelled interface coordinates. The coupling sees nothing else of a structure.
+"""ReducedModel: small dense M, C, K with labelled interface coordinates: all that coupling uses of a structure.
 
 Needs numpy, scipy and the record store only: users of another code start with `ReducedModel.from_matrices`.
 """

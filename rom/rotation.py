@@ -2,9 +2,9 @@
 
 The basis joins Craig-Bampton bases at several speeds, each from one factorisation. The constraint modes at
 standstill move the interface; at other speeds these modes, and the fixed-interface and quasi-static modes there,
-differ from those at standstill by motions that leave the interface at rest. Of these differences a basis, orthogonal to
-the modes at standstill in strain energy, is added to the constraint modes: every smaller model (rom.truncation) keeps
-it. The stiffness is almost linear in the squared speed, so that a few speeds are enough, spaced evenly in its square.
+differ by motions that leave the interface at rest. A basis of these differences, orthogonal to the modes at standstill
+in strain energy, is added to the constraint modes: every smaller model (rom.truncation) keeps it. The stiffness is
+almost linear in the squared speed, so that a few speeds are enough, spaced evenly in its square.
 
 The error between the speeds of the basis is estimated halfway (in the square), by the gain of the model from
 the basis of that speed, which is exact there but for the modes cut off at every speed.

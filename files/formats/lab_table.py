@@ -1,10 +1,10 @@
 """Tables of measurements as text, in the spellings of laboratory programs; ambiguous tables are rejected.
 
-Columns stand between semicolons, tabs, commas or blanks. Numbers have decimal points or, unless commas separate
+Semicolons, tabs, commas or blanks separate columns. Numbers have decimal points or, unless commas separate
 columns, decimal commas; complex ones have an i or j. Text is UTF-8, UTF-16 or Latin-1. Data begin at the first line of
-two or more cells whose first is a number; the last line before them with as many cells names the columns, or gives
-their units below the names; the others are remarks. Lines that begin with #, %, ! or // are remarks, too, unless the
-last one before the data names its columns.
+two or more cells whose first is a number; the last earlier line with as many cells names the columns, or gives their
+units below the names; the others are remarks. Lines that begin with #, %, ! or // are remarks as well, unless the last
+one before the data names its columns.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _KINDS = {
 
 
 class Column(NamedTuple):
-    """A column: its header, name and unit there, "rms", "pk", "pk-pk" or "" of an amplitude, its place from 0.
+    """A column: header, name and unit in it, kind of amplitude ("rms", "pk", "pk-pk" or ""), position from 0.
 
     unknown: text in brackets in the header that is not a unit."""
 

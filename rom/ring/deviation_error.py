@@ -1,8 +1,9 @@
 """Error that a reduced ring makes of the frequencies of a ring of which one sector deviates, by its residual.
 
-A mode x of the reduced ring with the squared frequency q is one of the full one but for the force r = K x - q M x,
-which no motion of the reduced ring feels. Its frequency is too high by about r^T K^-1 r / (2 q), K^-1 at most that of
-the tuned ring over 1 + d where a part is softer by d. In waves around the ring, this takes one sector per diameter.
+A mode x of the reduced ring with the squared frequency q is a mode of the full ring, except for the force
+r = K x - q M x, which is orthogonal to all motions of the reduced ring. Its frequency is too high by about
+r^T K^-1 r / (2 q), where K^-1 is at most the tuned ring's over 1 + d if a part is softer by d. In waves around the
+ring, this takes one sector per diameter.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Families of a ring's natural modes: of the tuned ring by nodal diameter, of a mistuned one by their kinetic energy.
 
-Families may overlap in frequency: the second one of few diameters may lie below the first one of many. The number of a
-mode among those of its own diameter still names its family; a mode of a ring with deviations belongs to the family in
-which most of its kinetic energy is.
+Families may overlap in frequency: the second family at few diameters may lie below the first at many. The number of a
+mode within its diameter still names its family; a mode of a ring with deviations belongs to the family with most of
+its kinetic energy.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ In the waves of the tuned ring, deviations d_j of the stiffness act on a motion 
 
 linear in the deviations, with load and damping left out for natural modes: the fundamental mistuning model (Feiner and
 Griffin 2004, J. Turbomach. 126(1)) with the sectors' own stiffness. The displacement of one coordinate in every
-sector gives the N waves of one family; the other waves follow from deviations found before, in a few rounds.
+sector gives the N waves of one family; the other waves follow from the deviations, in a few iterations.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Component modes of a sector: motions of its faces, and inner motions that leave these at rest.
 
-From the waves of the ring (rom.ring.diameters), so that they hold these, come the faces' motions, their static
-continuation into the sector, and what of the waves remains with the faces at rest. Modes of a sector whose faces are at
-rest and whose part is much softer or stiffer hold what large deviations add. As in Craig-Bampton's method, sectors are
+The waves of the ring (rom.ring.diameters) give the faces' motions, their static continuation into the sector, and the
+remaining inner motions with the faces at rest, so that the basis contains the waves. Modes of a sector with its faces
+at rest and a much softer or stiffer part add the effect of large deviations. As in Craig-Bampton's method, sectors are
 joined at their faces, where inner motions are zero, so that no reduced frequency is below the true one.
 """
 

@@ -26,9 +26,9 @@ _MARGIN = 0.05
 class Amplification(NamedTuple):
     """Largest amplitude over the sectors of a mistuned ring, and over the tuned ring's.
 
-    factor        of the largest amplitude over the tuned one
-    sector        where it is
-    frequency_hz  at which it is
+    factor        largest amplitude over the tuned ring's
+    sector        of the largest amplitude
+    frequency_hz  of the largest amplitude
     amplitude     m/N
     participation number of sectors that take part in the response there (rom.ring.forced.participation)
     """

@@ -1,12 +1,11 @@
 """Decks of Abaqus and CalculiX (.inp): nodes in global coordinates, elements and sets.
 
-Every keyword that gives or moves nodes and elements is followed or rejected. Others say nothing about the mesh: their
-meaning for the structure (materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads, steps)
-is said in the case, in global axes.
+Every keyword that defines or moves nodes and elements is followed or rejected. Others do not change the mesh: the case
+defines materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads and steps, in global axes.
 
-Why not meshlane: of the tests' 24 decks that must be rejected version 5.5.0 reads 17 as meshes, and of 18 sound ones it
-reads 5 with the same nodes, elements and sets: it knows no *SYSTEM, moves no instance, and skips six- and eight-node
-shells (CPS6, CPS8). meshio 5.3.5 reads 14 and 5.
+Why not meshlane: version 5.5.0 reads 17 of the tests' 24 decks that must be rejected, and reads 5 of 18 sound ones with
+the same nodes, elements and sets: it lacks *SYSTEM, moves no instance, and skips six- and eight-node shells (CPS6,
+CPS8). meshio 5.3.5 reads 14 and 5.
 """
 
 from __future__ import annotations

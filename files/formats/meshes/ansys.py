@@ -1,6 +1,6 @@
 """Ansys archives (.cdb, written by CDWRITE): nodes, elements and components.
 
-Read are the blocks NBLOCK, EBLOCK and CMBLOCK and the types of elements (ET, ETBLOCK). Source: Ansys Mechanical APDL,
+Reads the blocks NBLOCK, EBLOCK and CMBLOCK and the types of elements (ET, ETBLOCK). Source: Ansys Mechanical APDL,
 guide to interfacing, coded database file commands; element reference for the nodes of degenerate shapes.
 
 Why not mapdl-archive: version 0.4.2 reads a file that is cut within its elements as a mesh of 86 in place of 298,
