@@ -1,7 +1,7 @@
-"""A file that a long command keeps while it works, and from which the same command resumes after a kill.
+"""Checkpoint of a long command, from which the same command resumes after it was killed.
 
-Each write makes a new file, which takes the place of the old one when it is complete, so that a kill at any moment
-leaves one that can be read. Writing takes at most a hundredth of the time.
+Each write makes a new file, which replaces the old one when it is complete, so that a readable file remains
+whenever the command is killed. Writing takes at most 1 % of the time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SHARE = 100
 
 
 class CheckpointFile:
-    """The checkpoint of one command (path None: nothing is kept), a context manager: it writes the rest as it ends.
+    """The checkpoint of one command (path None: nothing is stored), a context manager that writes at its end.
 
     kind: of its record; belongs: by attribute the input that it belongs to, and its name in messages; content:
     returns variables and further attributes of the record, and how much is finished, in words.
@@ -38,7 +38,7 @@ class CheckpointFile:
     def read(self) -> tuple[dict[str, Any], dict[str, Any]] | None:
         """Return variables and attributes of the file, None if there is none.
 
-        Raises InputError for a file of something else, or one that cannot be read.
+        Raises InputError for another file, or an unreadable one.
         """
         path = self._path
         if path is None or not path.exists():
@@ -46,16 +46,16 @@ class CheckpointFile:
         try:
             with decoding(path):
                 variables, attributes = load(path, self._kind)
-                found = {name: json.loads(attributes[name]) for name in self._belongs}
+                recorded = {name: json.loads(attributes[name]) for name in self._belongs}
         except StoreError as error:
             raise InputError(
                 f"{path}: a checkpoint that cannot be read ({error}); nothing was done to it: move it away, or delete "
                 "it to start again"
             ) from error
-        for name, (what, data) in self._belongs.items():
-            if found[name] != json.loads(json.dumps(data)):
+        for name, (owner, data) in self._belongs.items():
+            if recorded[name] != json.loads(json.dumps(data)):
                 raise InputError(
-                    f"{path}: the checkpoint of another {what}; nothing was done to it: move it away, or delete it to "
+                    f"{path}: the checkpoint of another {owner}; nothing was done to it: move it away, or delete it to "
                     "start again"
                 )
         return variables, attributes
@@ -81,7 +81,7 @@ class CheckpointFile:
             self.write()
 
     def write(self) -> None:
-        """Write what has changed. Raises StoreError, such as for a full disk."""
+        """Write changes. Raises StoreError, such as for a full disk."""
         if self._path is None or not self._unsaved:
             return
         started = time.perf_counter()
@@ -91,8 +91,8 @@ class CheckpointFile:
             attributes = belongs | dict(attributes) | {"finished": finished}
             save(self._path, self._kind, variables, attributes, compressed=False)
         except StoreError as error:
-            kept = "what was finished before is in it" if self._path.exists() else "nothing is kept"
-            raise StoreError(f"{error}; {finished}, {kept}; make room and run the same command again") from error
+            remains = "what was finished before is in it" if self._path.exists() else "nothing is kept"
+            raise StoreError(f"{error}; {finished}, {remains}; make room and run the same command again") from error
         self._unsaved = False
         ended = time.perf_counter()
         self._next = ended + SHARE * (ended - started)

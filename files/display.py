@@ -45,7 +45,7 @@ class Plotted(Displayed):
     """Base of results that have a figure."""
 
     def plot(self, scene: Any = None) -> Any:
-        """Return the interactive figure (plotly) of `vanedamp.plot`. scene: that of a response, for its walls."""
+        """Return the interactive figure (plotly) of `vanedamp.plot`. scene: of a response, for its walls."""
         import vanedamp
 
         return vanedamp.plot(self, scene)
@@ -78,7 +78,7 @@ def _shown(value: Any) -> str | None:
     if isinstance(value, Mapping):
         return _cut(", ".join(f"{key}: {_shown(item)}" for key, item in value.items()))
     if is_dataclass(value):
-        return _cut(f"{type(value).__name__}({_given(value)})")
+        return _cut(f"{type(value).__name__}({_changed(value)})")
     if isinstance(value, list | tuple):
         if len(value) > _ENTRIES:
             return f"{len(value)} of {type(value[0]).__name__}"
@@ -86,7 +86,7 @@ def _shown(value: Any) -> str | None:
     return _cut(f"{value:.6g}" if isinstance(value, float) else str(value))
 
 
-def _given(record: Any) -> str:
+def _changed(record: Any) -> str:
     """Return the fields of a dataclass that have other values than their defaults."""
     values = [(item.name, getattr(record, item.name), item.default) for item in fields(record)]
     return ", ".join(f"{name}={_shown(value)}" for name, value, default in values if value is not default)

@@ -12,7 +12,7 @@ _WORD, _MESSAGE = 500, 4000
 class VanedampError(ValueError):
     """Bad input: a file, an argument or a combination of them that cannot be used.
 
-    Every error class of this project derives from it. The message is one line: what, where, and what would be right.
+    Base of all error classes of this project. The message is one line: the fault, its place, and the remedy.
     Any other exception is a fault of the program.
     """
 
@@ -22,7 +22,7 @@ class VanedampError(ValueError):
 
 def shortened(message: str) -> str:
     """Return a message with its long words, such as a key of a damaged file, cut in the middle, and not too long."""
-    text = re.sub(rf"\S{{{_WORD},}}", lambda found: _cut(found[0], _WORD), message)
+    text = re.sub(rf"\S{{{_WORD},}}", lambda match: _cut(match[0], _WORD), message)
     return _cut(text, _MESSAGE)
 
 

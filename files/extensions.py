@@ -1,4 +1,4 @@
-"""Parts that are found or named, not imported: modules of ours, and what other packages add by entry points.
+"""Parts that are found or named, not imported: our own modules, and other packages' entry points.
 
 An installed package adds a part in its pyproject.toml, without a change here:
 
@@ -20,7 +20,7 @@ from vanedamp.files.errors import VanedampError
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-#: place of a part that has no ORDER: after those that have one
+#: order of a part without ORDER: after parts that have one
 _LAST = 1000
 
 
@@ -29,7 +29,7 @@ class ExtensionError(VanedampError):
 
 
 class ExtensionPoint(NamedTuple):
-    """Where parts of one kind come from that are loaded all at once.
+    """Source of parts of one kind that are all loaded at once.
 
     A part is a module, or any object with the attributes.
 
@@ -61,18 +61,18 @@ class ExtensionPoint(NamedTuple):
 
     def all(self) -> dict[str, Any]:
         """Return our own parts and other packages'. Raises ExtensionError for one that cannot be used."""
-        own = self.own()
-        added = _added(self.kind, self.group, own)
-        return _in_order(own | {name: _load(entry, self.kind, self.attributes) for name, entry in added.items()})
+        ours = self.own()
+        added = _added(self.kind, self.group, ours)
+        return _in_order(ours | {name: _load(entry, self.kind, self.attributes) for name, entry in added.items()})
 
 
 def added_parts(kind: str, group: str) -> dict[str, Any]:
-    """Return what other packages add under a group, by name. Raises ExtensionError for what cannot be loaded."""
+    """Return other packages' parts of a group by name. Raises ExtensionError for one that cannot be loaded."""
     return {name: _load(entry, kind, ()) for name, entry in _added(kind, group, {}).items()}
 
 
 class Registry(NamedTuple):
-    """Where parts of one kind come from that are loaded one by one, as they are wanted.
+    """Source of parts of one kind that are loaded one by one when needed.
 
     kind        in words, for messages
     parts       by name: ours, as "package.module" or "package.module:object" until they are loaded, and others
@@ -113,11 +113,11 @@ class Registry(NamedTuple):
             raise ExtensionError(f"{part!r}: there is a {self.kind} named {name} already; name it otherwise")
 
 
-def _added(kind: str, group: str, own: Mapping[str, Any]) -> dict[str, EntryPoint]:
+def _added(kind: str, group: str, ours: Mapping[str, Any]) -> dict[str, EntryPoint]:
     """Return the entry points of a group by name."""
     entries: dict[str, EntryPoint] = {}
     for entry in _entry_points(group, tuple(sys.path)):
-        if entry.name in own or entry.name in entries:
+        if entry.name in ours or entry.name in entries:
             raise ExtensionError(f"{_source(entry)}: there is a {kind} named {entry.name} already; name it otherwise")
         entries[entry.name] = entry
     return entries

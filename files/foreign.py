@@ -26,7 +26,7 @@ _DEADLY = [
 _Read = TypeVar("_Read")
 #: s of processor time for a fork, and bytes a second beyond them; and how many times as long it may wait
 _PATIENCE, _SPEED, _WAITS = 60, 1e6, 20
-#: bytes that deflate makes of one, at most
+#: most bytes that deflate expands one byte to
 _INFLATED = 1100
 #: bytes that a fork may take, and further ones per byte of its file
 _MEMORY, _PER_BYTE = 2 << 30, 100
@@ -64,47 +64,47 @@ def reading(path: str | os.PathLike[str], error: type[VanedampError], expected: 
     except Exception as reason:
         if isinstance(reason, OSError) and reason.errno:
             raise
-        told = " ".join(str(reason).split()) or type(reason).__name__
-        raise error(f"{path}: {expected}: damaged, or of another format ({told})") from reason
+        message = " ".join(str(reason).split()) or type(reason).__name__
+        raise error(f"{path}: {expected}: damaged, or of another format ({message})") from reason
 
 
 def self_contained(file: h5py.File) -> None:
-    """Check that an HDF5 file holds all its data: what leads to other files would show these, and shapes without data
-    would fill the memory.
+    """Check that an HDF5 file holds all its data: links would expose other files, and shapes without data would fill
+    the memory.
 
     Raises VanedampError for links other than hard ones, data in other files (external or virtual), and shapes that
     the bytes of the file cannot fill.
     """
     import h5py
 
-    def reject(what: str) -> NoReturn:
-        raise VanedampError(f"{file.filename}: {what}; expected a file that holds its data itself")
+    def reject(reason: str) -> NoReturn:
+        raise VanedampError(f"{file.filename}: {reason}; expected a file that holds its data itself")
 
-    groups, known, room = [h5py.Group(file.id)], set(), _INFLATED * os.path.getsize(file.filename)
+    groups, addresses, room = [h5py.Group(file.id)], set(), _INFLATED * os.path.getsize(file.filename)
     while groups:
         group = groups.pop()
         for name in group:
-            place = f"{group.name.rstrip('/')}/{name}".lstrip("/")
+            path = f"{group.name.rstrip('/')}/{name}".lstrip("/")
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-                reject(f"{place} is a link to data elsewhere")
+                reject(f"{path} is a link to data elsewhere")
             item = group[name]
-            if h5py.h5o.get_info(item.id).addr in known:  # another name of it
+            if h5py.h5o.get_info(item.id).addr in addresses:  # another name of it
                 continue
-            known.add(h5py.h5o.get_info(item.id).addr)
+            addresses.add(h5py.h5o.get_info(item.id).addr)
             if isinstance(item, h5py.Group):
                 groups.append(item)
             elif isinstance(item, h5py.Dataset):
                 if item.is_virtual or item.external:
-                    reject(f"the data of {place} are in other files")
+                    reject(f"the data of {path} are in other files")
                 room -= item.size * item.dtype.itemsize if item.shape else 0
                 if room < 0:
-                    reject(f"{place} has the shape {item.shape}, more than its bytes can fill")
+                    reject(f"{path} has the shape {item.shape}, more than its bytes can fill")
 
 
 def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callable[[], _Read]) -> _Read:
-    """Return what `read` makes of a file, called in a fork of this process: damage may crash or hang its library.
+    """Return the result of `read` for a file, called in a fork of this process: damage may crash or hang its library.
 
-    What it returns is pickled. Raises `error` for a fork that ends by a signal, and for an error about input of
+    The result is pickled. Raises `error` for a fork that ends by a signal, and for an error about input of
     `read`; ValueError with the words of another exception. Where the system has no forks, `read` is called here.
     """
     if not hasattr(os, "fork"):
@@ -116,26 +116,26 @@ def apart(path: str | os.PathLike[str], error: type[VanedampError], read: Callab
         warnings.simplefilter("ignore", DeprecationWarning)  # of threads, none of which reads files
         child = os.fork()
     if child == 0:
-        _tell(read, writing, seconds, _MEMORY + _PER_BYTE * size)
+        _answer(read, writing, seconds, _MEMORY + _PER_BYTE * size)
     os.close(writing)
     try:
         with os.fdopen(reading, "rb") as stream:
-            told = stream.read()
+            answer = stream.read()
     finally:
         _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         number = signal.Signals(os.WTERMSIG(status))
         limits = {signal.SIGPROF: seconds, signal.SIGALRM: _WAITS * seconds}
-        what = f"takes more than {limits[number]} s" if number in limits else number.name
-        raise error(f"{path}: damaged: its library ends in the middle of it ({what}); write it again")
-    made, failure, of_input = pickle.loads(told)
+        cause = f"takes more than {limits[number]} s" if number in limits else number.name
+        raise error(f"{path}: damaged: its library ends in the middle of it ({cause}); write it again")
+    result, failure, of_input = pickle.loads(answer)
     if failure is not None:
         raise (error if of_input else ValueError)(failure)
-    return made
+    return result
 
 
-def _tell(read: Callable[[], object], writing: int, seconds: int, memory: int) -> None:
-    """Read, silently, write what comes of it, and end this process."""
+def _answer(read: Callable[[], object], writing: int, seconds: int, memory: int) -> None:
+    """Read silently, write the result, and end this process."""
     try:
         for number in _DEADLY:
             signal.signal(number, signal.SIG_DFL)
@@ -146,21 +146,21 @@ def _tell(read: Callable[[], object], writing: int, seconds: int, memory: int) -
         signal.alarm(_WAITS * seconds)
         try:
             _limit_memory(memory)
-            told = pickle.dumps((read(), None, False), protocol=5)
+            answer = pickle.dumps((read(), None, False), protocol=5)
         except BaseException as reason:  # the library may end the program
-            told = pickle.dumps((None, str(reason) or type(reason).__name__, isinstance(reason, VanedampError)))
+            answer = pickle.dumps((None, str(reason) or type(reason).__name__, isinstance(reason, VanedampError)))
         with os.fdopen(writing, "wb") as stream:
-            stream.write(told)
+            stream.write(answer)
     finally:
         os._exit(0)
 
 
 def _limit_memory(more: int) -> None:
-    """Let this process take so many bytes more than it has: beyond them it has a MemoryError."""
+    """Limit further memory of this process to this many bytes, by a MemoryError."""
     with contextlib.suppress(OSError, ImportError):  # systems without /proc, or without limits
         import resource
 
-        taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+        used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
         soft, hard = resource.getrlimit(resource.RLIMIT_AS)
         unlimited = resource.RLIM_INFINITY
-        resource.setrlimit(resource.RLIMIT_AS, (taken + more if soft == unlimited else min(soft, taken + more), hard))
+        resource.setrlimit(resource.RLIMIT_AS, (used + more if soft == unlimited else min(soft, used + more), hard))

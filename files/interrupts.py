@@ -13,7 +13,7 @@ from typing import Any
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Keep interrupts from the work done meanwhile, and from processes that are started: this one sees them at the end.
+    """Delay interrupts of this process to the end of the context, and keep them from processes started in it.
 
     Processes inherit that interrupts are blocked. To have them ignore it is too late, and shows a traceback, for an
     interrupt while they load. Blocked here, it may still come by way of another thread, which waits as well.
@@ -59,11 +59,11 @@ def signals_kept() -> Iterator[None]:
         yield
         return
     libc = ctypes.CDLL(None)
-    kept = {number: ctypes.create_string_buffer(1024) for number in signal.valid_signals()}  # of any sigaction
-    for number, action in kept.items():
+    actions = {number: ctypes.create_string_buffer(1024) for number in signal.valid_signals()}  # of any sigaction
+    for number, action in actions.items():
         libc.sigaction(number, None, action)
     try:
         yield
     finally:
-        for number, action in kept.items():
+        for number, action in actions.items():
             libc.sigaction(number, action, None)

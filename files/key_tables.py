@@ -22,7 +22,7 @@ Record = TypeVar("Record")
 Schema = dict[str, Any]
 #: the part of a key's path that the file chooses: [interface.<name>]
 NAME = "<name>"
-#: a default that a description tells in words
+#: a default that the description states in words
 DEFAULT = re.compile(r" \(default: ([^()]+)\)")
 #: types of JSON in words
 WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
@@ -38,11 +38,11 @@ class Key(NamedTuple):
     meaning: str
 
 
-class Table(NamedTuple):
+class KeyTable(NamedTuple):
     """A table of a file.
 
-    path: dotted, `excitation.harmonic`; heading: as it stands in the file, `[[excitation.harmonic]]`; variant: the
-    value of the key that tells tables of one name apart, such as a method's, "" without one; text: its meaning.
+    path: dotted, `excitation.harmonic`; heading: as in the file, `[[excitation.harmonic]]`; variant: the value of the
+    key that distinguishes tables of one name, such as a method's, "" without one; text: its meaning.
     """
 
     path: str
@@ -53,22 +53,22 @@ class Table(NamedTuple):
 
     def anchor(self, key: str = "") -> str:
         """Return the anchor of the table, or of a key in it."""
-        return ".".join(part for part in (self.path, self.variant, key) if part).replace(NAME, "name")
+        return ".".join(name for name in (self.path, self.variant, key) if name).replace(NAME, "name")
 
     def dotted(self, key: str) -> str:
         """Return the dotted name of a key, without the variant."""
         return f"{self.path}.{key}" if self.path else key
 
 
-def tables(schema: Schema) -> Iterator[Table]:
+def tables(schema: Schema) -> Iterator[KeyTable]:
     """Yield the tables of a file in their order, each before those inside it; one that variants share once."""
     top = _keys(schema, schema)
     if top:
-        yield Table("", "Before the first table", "", "", top)
+        yield KeyTable("", "Before the first table", "", "", top)
     yield from dict.fromkeys(_inner(schema, schema, ""))
 
 
-def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator[Table]:
+def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator[KeyTable]:
     for name, node in table.get("properties", {}).items():
         yield from _tables_at(schema, node, f"{path}.{name}" if path else name, node.get("description", ""))
     others = table.get("additionalProperties")
@@ -76,38 +76,38 @@ def _inner(schema: Schema, table: Schema, path: str, text: str = "") -> Iterator
         yield from _tables_at(schema, others, f"{path}.{NAME}", text)
 
 
-def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[Table]:
+def _tables_at(schema: Schema, node: Schema, path: str, text: str) -> Iterator[KeyTable]:
     """Yield the tables that a key stands for: one, the variants of one, or a list's."""
-    found = _own_tables(schema, node)
+    tables = _own_tables(schema, node)
     brackets = "[[{}]]" if any("items" in option for option in options(schema, node)) else "[{}]"
-    for one in found:
-        told = _distinguishing(one, found)
-        heading = brackets.format(path) + "".join(f' {key} = "{value}"' for key, value in told.items())
-        others = one.get("additionalProperties")
-        own = others if isinstance(others, dict) and not _own_tables(schema, others) else None
-        if "properties" in one or own is not None:
-            free = () if own is None else (_key(schema, NAME, {"description": text} | own, False),)
-            said = "" if own is not None and "description" not in own else one.get("description", text)
-            yield Table(path, heading, "".join(told.values()), said, _keys(schema, one, told) + free)
-        yield from _inner(schema, one, path, text)
+    for table in tables:
+        tags = _distinguishing(table, tables)
+        heading = brackets.format(path) + "".join(f' {key} = "{value}"' for key, value in tags.items())
+        others = table.get("additionalProperties")
+        values = others if isinstance(others, dict) and not _own_tables(schema, others) else None
+        if "properties" in table or values is not None:
+            free = () if values is None else (_key(schema, NAME, {"description": text} | values, False),)
+            said = "" if values is not None and "description" not in values else table.get("description", text)
+            yield KeyTable(path, heading, "".join(tags.values()), said, _keys(schema, table, tags) + free)
+        yield from _inner(schema, table, path, text)
 
 
 def _own_tables(schema: Schema, node: Schema) -> list[Schema]:
-    """Return the tables of a file that a node stands for, those in a list as well.
+    """Return the tables of a file that a node stands for, including tables in a list.
 
     Inline tables are values, and so are names with values where a list or a text would do as well.
     """
-    found, some = [], options(schema, node)
+    tables, some = [], options(schema, node)
     for option in some:
         if isinstance(option.get("items"), dict):
-            found += _own_tables(schema, option["items"])
+            tables += _own_tables(schema, option["items"])
         elif option.get("type") == "object" and "x-inline" not in option and ("properties" in option or len(some) == 1):
-            found.append(option)
-    return found
+            tables.append(option)
+    return tables
 
 
 def _distinguishing(table: Schema, among: list[Schema]) -> dict[str, str]:
-    """Return the key that tells a table from others of its name, with its value."""
+    """Return the key that distinguishes a table from others of its name, with its value."""
     if len(among) < 2:
         return {}
     here = constants(table)
@@ -142,14 +142,14 @@ def _value(schema: Schema, node: Schema) -> str:
         others = node.get("additionalProperties")
         inner = f"{NAME} = {_value(schema, others)}" if isinstance(others, dict) else ", ".join(node["properties"])
         return "{" + inner + "}"
-    return " ".join(part for part in (WORDS.get(node.get("type", ""), "any"), _range(node)) if part)
+    return " ".join(text for text in (WORDS.get(node.get("type", ""), "any"), _range(node)) if text)
 
 
 def _list(schema: Schema, node: Schema) -> str:
     if "prefixItems" in node:
-        items = [" or ".join(_value(schema, one) for one in options(schema, item)) for item in node["prefixItems"]]
+        items = [" or ".join(_value(schema, kind) for kind in options(schema, item)) for item in node["prefixItems"]]
         return f"[{', '.join(items)}]"
-    kinds = dict.fromkeys(_value(schema, one) for one in options(schema, node.get("items", {})))
+    kinds = dict.fromkeys(_value(schema, kind) for kind in options(schema, node.get("items", {})))
     least, most = node.get("minItems", 0), node.get("maxItems")
     count = f" ({least}{'' if most == least else f' to {most}' if most else ' or more'})" if least > 1 or most else ""
     return f"list{count} of {' or '.join(kinds)}"
@@ -239,8 +239,8 @@ def key_text(made: Schema) -> str:
         for key in table.keys:
             unit = f" [{key.unit}]" if key.unit else ""
             default = key.default if key.default in ("", "required") else f"default {key.default}"
-            told = "; ".join(part for part in (f"{key.meaning}{unit}", key.value, default) if part)
+            text = "; ".join(word for word in (f"{key.meaning}{unit}", key.value, default) if word)
             lines += textwrap.wrap(
-                f"{key.name}: {told}", 100, initial_indent="  ", subsequent_indent="      ", break_on_hyphens=False
+                f"{key.name}: {text}", 100, initial_indent="  ", subsequent_indent="      ", break_on_hyphens=False
             )
     return "\n".join(lines).lstrip("\n")

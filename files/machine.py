@@ -1,4 +1,4 @@
-"""What a machine lacks, by the errors that say so: packages and memory."""
+"""Missing packages and memory of a machine, recognised by errors."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def not_loaded(error: ImportError | OSError) -> str | None:
 
 
 def out_of_memory(error: BaseException | None) -> str | None:
-    """Return what the memory has no room for, in the words of an error or of its causes; None for another error."""
-    found = None
+    """Return the message of an error about memory, or of such a cause of it; None for another error."""
+    reason = None
     while error is not None:
         no_memory = isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
         if no_memory or _NO_MEMORY.search(str(error)):
-            found = str(error) or "none left"  # in the end the first cause
+            reason = str(error) or "none left"  # in the end the first cause
         error = error.__cause__ or error.__context__
-    return found
+    return reason

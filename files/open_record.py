@@ -60,11 +60,11 @@ class OpenRecord:
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        made = handler(schema)
-        properties = handler.resolve_ref_schema(made)["properties"]
+        json_schema = handler(schema)
+        properties = handler.resolve_ref_schema(json_schema)["properties"]
         del properties["added"]
         properties |= {key: handler(_schema(kind)) for key, kind in cls.keys_added().items()}
-        return made
+        return json_schema
 
 
 def _schema(kind: Any) -> CoreSchema:

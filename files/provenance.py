@@ -1,4 +1,4 @@
-"""Which software made a result."""
+"""Software versions of a result."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import platform
 def versions() -> dict[str, str]:
     """Return the versions of this project and of the libraries its numbers depend on."""
     try:
-        own = importlib.metadata.version("vanedamp")
+        version = importlib.metadata.version("vanedamp")
     except importlib.metadata.PackageNotFoundError:  # run from a source tree
-        own = "not installed"
+        version = "not installed"
     # the system's h5py has no package metadata
     others = {name: str(importlib.import_module(name).__version__) for name in ("numpy", "scipy", "numba", "h5py")}
-    return {"vanedamp": own, "python": platform.python_version()} | others
+    return {"vanedamp": version, "python": platform.python_version()} | others

@@ -1,4 +1,4 @@
-"""Records by declaration: a field says its dimensions and unit once; file, JSON and data set come from that.
+"""Records by declaration: fields declare dimensions and units once; file, JSON and data set follow.
 
     @dataclass(frozen=True, eq=False, repr=False)
     class Decay(Record):
@@ -7,9 +7,10 @@
         amplitude: Annotated[np.ndarray, Array(("time", "body"), "m")]
         status: str
 
-A field is an array (Array), arrays by name (Columns), a tuple of small records of one class, whose fields are columns
-(Rows), a tuple of parts that have arrays of different lengths (Ragged), arrays by dotted path (Paths), a sparse matrix
-(Sparse), another record in the same file (Within), or plain data that pydantic knows: an attribute of the file.
+A field is an array (Array), arrays by name (NamedArrays), a tuple of small records of one class, whose fields are
+columns (RecordRows), a tuple of parts that have arrays of different lengths (Ragged), arrays by dotted path (Paths), a
+sparse matrix (SparseMatrix), another record in the same file (Within), or plain data that pydantic accepts: an
+attribute of the file.
 """
 
 from __future__ import annotations
@@ -63,23 +64,23 @@ class Array(NamedTuple):
     imaginary: str = "_imaginary"
 
 
-class Rows(NamedTuple):
-    """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `Unit`s.
+class RecordRows(NamedTuple):
+    """A tuple of dataclasses, a variable "<dim>_<field>" for each of their fields, whose units are `NumberUnit`s.
 
-    Those that have defaults are left out where all rows have all of these.
+    Fields with defaults are omitted if all rows have these.
     """
 
     dim: str
 
 
-class Columns(NamedTuple):
+class NamedArrays(NamedTuple):
     """A mapping of arrays by name, a variable each: of a table that knows unit, further dims and dtype of every name.
 
-    known: returns the table; dims: first dimensions of all of them; prefix: of names in the file; in_json: returns the
+    table: returns it; dims: first dimensions of all of them; prefix: of names in the file; in_json: returns the
     part of the table that JSON has (None: all).
     """
 
-    known: Callable[[], Mapping[str, Any]]
+    table: Callable[[], Mapping[str, Any]]
     dims: tuple[str, ...] = ()
     prefix: str = ""
     in_json: Callable[[], Mapping[str, Any]] | None = None
@@ -88,8 +89,8 @@ class Columns(NamedTuple):
 class Ragged(NamedTuple):
     """A tuple of dataclasses with declared fields, each with rows of its own number along `dim`.
 
-    The rows of all stand one after the other, and "<thing>_of_<dim>" says whose each is. What has no rows is a variable
-    along `thing`; Rows have "<dim of the rows>_<thing>" in the same way. prefix: of names, and of `dim`, in the file.
+    The rows of all follow one another, and "<thing>_of_<dim>" has the owner of each. Fields without rows are variables
+    along `thing`; RecordRows have "<dim of the rows>_<thing>" in the same way. prefix: of names and `dim` in the file.
     """
 
     thing: str
@@ -127,7 +128,7 @@ class Paths(NamedTuple):
         return {path: store.frozen(array, array.dtype) for path, array in arrays.items()}
 
 
-class Sparse(NamedTuple):
+class SparseMatrix(NamedTuple):
     """A square sparse matrix, compressed by rows: its entries, "<name>_column" and "<name>_row_start"."""
 
     unit: str
@@ -150,13 +151,13 @@ class Sparse(NamedTuple):
 
 
 class Own(NamedTuple):
-    """A field with functions that return its variables, and find it in those of a file.
+    """A field with functions that return its variables, and read it from the variables of a file.
 
     Without: one that its class writes and reads by itself, in `variables`, `attributes`, `derived` and `of`.
     """
 
     variables: Callable[[Any], dict[str, store.Variable]] | None = None
-    found: Callable[[Mapping[str, Any]], Any] | None = None
+    read: Callable[[Mapping[str, Any]], Any] | None = None
 
 
 class Within(NamedTuple):
@@ -165,7 +166,7 @@ class Within(NamedTuple):
     json: tuple[str, ...] = ()
 
 
-class Unit(NamedTuple):
+class NumberUnit(NamedTuple):
     """The unit of a number."""
 
     unit: str
@@ -184,9 +185,11 @@ class Coded(NamedTuple):
     decode: Callable[[Any, str], Any]
 
 
-Layout = Array | Columns | Rows | Ragged | Paths | Sparse | Within | Own | Named | Coded | Unit | None
-#: layouts of what is no attribute
-_VARIABLES = (Columns, Rows, Ragged, Paths, Sparse, Within, Own)
+Layout = (
+    Array | NamedArrays | RecordRows | Ragged | Paths | SparseMatrix | Within | Own | Named | Coded | NumberUnit | None
+)
+#: layouts of fields that are not attributes
+_VARIABLES = (NamedArrays, RecordRows, Ragged, Paths, SparseMatrix, Within, Own)
 
 
 def empty() -> np.ndarray:
@@ -215,84 +218,90 @@ class Record(Displayed):
         return {}
 
     def dimensions(self) -> dict[str, tuple[str, ...]]:
-        """Return what dimensions of declared fields stand for, such as those of a grid, by name."""
+        """Return the actual dimensions by declared dimension, such as the axes of a grid."""
         return {}
 
     def dims(self, declared: tuple[str, ...]) -> tuple[str, ...]:
         """Return dimensions as the file names them."""
-        own = self.dimensions()
-        return tuple(dim for name in declared for dim in own.get(name, (name,)))
+        lengths = self.dimensions()
+        return tuple(dim for name in declared for dim in lengths.get(name, (name,)))
 
     def unit_in_file(self, declared: str) -> str:
         """Return the unit of declared fields, some of which stand for that of a number, such as a parameter's."""
         return declared
 
     def derived(self) -> dict[str, Any]:
-        """Return what JSON has besides the fields, or in place of one."""
+        """Return the entries of JSON besides the fields, or instead of one."""
         return {}
 
     def variables(self) -> dict[str, store.Variable]:
         """Return the variables of the file."""
-        found, optional = {}, _optional(type(self))
+        variables, optional = {}, _optional(type(self))
         for name, (kind, layout) in declared(type(self)).items():
             value = getattr(self, name)
             if isinstance(layout, Array) and not layout.attribute and not _missing(value, name in optional):
                 stored = np.asarray(value, np.int8 if layout.dtype is bool else layout.dtype)
-                for part, values in _parts(stored, layout.imaginary).items():
+                for suffix, values in _parts(stored, layout.imaginary).items():
                     dims, unit = self.dims(layout.dims), self.unit_in_file(layout.unit)
-                    found[(layout.name or name) + part] = store.Variable(values, dims, unit)
-            elif isinstance(layout, Columns):
-                for each, values in value.items():
-                    one = layout.known()[each]
-                    dims = self.dims((*layout.dims, *one.dims))
-                    found[layout.prefix + each] = store.Variable(values, dims, one.unit)
-            elif isinstance(layout, Rows) and (value or name not in optional):
-                found |= _row_variables(value, get_args(kind)[0], layout.dim, self.unit_in_file)
+                    variables[(layout.name or name) + suffix] = store.Variable(values, dims, unit)
+            elif isinstance(layout, NamedArrays):
+                for key, values in value.items():
+                    entry = layout.table()[key]
+                    dims = self.dims((*layout.dims, *entry.dims))
+                    variables[layout.prefix + key] = store.Variable(values, dims, entry.unit)
+            elif isinstance(layout, RecordRows) and (value or name not in optional):
+                variables |= _row_variables(value, get_args(kind)[0], layout.dim, self.unit_in_file)
             elif isinstance(layout, Ragged) and (value or name not in optional):
-                found |= self._ragged_variables(value, get_args(kind)[0], layout)
+                variables |= self._ragged_variables(value, get_args(kind)[0], layout)
             elif isinstance(layout, Within):
-                found |= value.variables() if value is not None else {}
-            elif isinstance(layout, Paths | Sparse):
-                found |= layout.written(name, value)
+                variables |= value.variables() if value is not None else {}
+            elif isinstance(layout, Paths | SparseMatrix):
+                variables |= layout.written(name, value)
             elif isinstance(layout, Own) and layout.variables and value is not None:
-                found |= layout.variables(value)
-        return found | {
+                variables |= layout.variables(value)
+        return variables | {
             dim: store.Variable(names if isinstance(names, np.ndarray) else np.array(list(names), object), (dim,))
             for dim, names in self.labels().items()
         }
 
     def _ragged_variables(self, parts: Sequence[Any], kind: type, ragged: Ragged) -> dict[str, store.Variable]:
         """Return the variables of parts (Ragged)."""
-        found, (thing, dim, prefix) = dict[str, store.Variable](), ragged
+        variables, (thing, dim, prefix) = dict[str, store.Variable](), ragged
         counts = [0] * len(parts)
         for field, (of, layout) in declared(kind).items():
             column = [getattr(part, field) for part in parts]
-            if isinstance(layout, Rows):
+            if isinstance(layout, RecordRows):
                 whose = np.repeat(np.arange(len(parts)), [len(rows) for rows in column])
-                rows = [row for each in column for row in each]
-                found |= _row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
-                found[f"{prefix}{layout.dim}_{thing}"] = store.Variable(whose, (prefix + layout.dim,))
-            elif isinstance(layout, Columns):
+                rows = [row for entries in column for row in entries]
+                variables |= _row_variables(rows, get_args(of)[0], prefix + layout.dim, self.unit_in_file)
+                variables[f"{prefix}{layout.dim}_{thing}"] = store.Variable(whose, (prefix + layout.dim,))
+            elif isinstance(layout, NamedArrays):
                 for name, values in joined(column, counts).items():
-                    one = layout.known()[name]
-                    found[prefix + layout.prefix + name] = store.Variable(values, (prefix + dim, *one.dims), one.unit)
+                    entry = layout.table()[name]
+                    variables[prefix + layout.prefix + name] = store.Variable(
+                        values, (prefix + dim, *entry.dims), entry.unit
+                    )
             elif isinstance(layout, Array) and layout.dims[0] == dim:
                 values, counts = np.concatenate(column), [len(own) for own in column]
                 stored = values.astype(np.int8) if layout.dtype is bool else values
-                for part, each in _parts(stored, layout.imaginary).items():
-                    name, dims = prefix + (layout.name or field) + part, (prefix + dim, *layout.dims[1:])
-                    found[name] = store.Variable(each, dims, self.unit_in_file(layout.unit))
+                for suffix, array in _parts(stored, layout.imaginary).items():
+                    name, dims = prefix + (layout.name or field) + suffix, (prefix + dim, *layout.dims[1:])
+                    variables[name] = store.Variable(array, dims, self.unit_in_file(layout.unit))
             else:
                 dtype, unit, dims = _column(of, layout)
                 name = prefix + _name(field, layout)
-                found[name] = store.Variable(np.array(column, dtype), (thing, *dims), self.unit_in_file(unit))
-        sizes = {dim: size for one in found.values() for dim, size in zip(one.dims, np.shape(one.values), strict=False)}
-        for name, one in found.items():  # of no rows, arrays have lost their further dimensions
-            if np.ndim(one.values) < len(one.dims):
-                shape = [sizes.get(each, 0) for each in one.dims]
-                found[name] = one._replace(values=np.reshape(one.values, shape))
-        found[f"{thing}_of_{dim}"] = store.Variable(np.repeat(np.arange(len(parts)), counts), (prefix + dim,))
-        return found
+                variables[name] = store.Variable(np.array(column, dtype), (thing, *dims), self.unit_in_file(unit))
+        sizes = {
+            dim: size
+            for entry in variables.values()
+            for dim, size in zip(entry.dims, np.shape(entry.values), strict=False)
+        }
+        for name, entry in variables.items():  # arrays without rows have lost their further dimensions
+            if np.ndim(entry.values) < len(entry.dims):
+                shape = [sizes.get(dim, 0) for dim in entry.dims]
+                variables[name] = entry._replace(values=np.reshape(entry.values, shape))
+        variables[f"{thing}_of_{dim}"] = store.Variable(np.repeat(np.arange(len(parts)), counts), (prefix + dim,))
+        return variables
 
     def plain(self, names: Container[str] | None = None) -> dict[str, Any]:
         """Return the fields that are neither arrays nor rows, as plain data. names: of those wanted; None: all."""
@@ -310,7 +319,7 @@ class Record(Displayed):
         None and optional tables without an entry are left out, but for the provenance.
         """
         optional = _optional(type(self))
-        found = {
+        attributes = {
             name: json.dumps(value) if isinstance(value, list) else value
             for name, value in self.plain().items()
             if value is not None and (value != {} or name not in optional or name == "provenance")
@@ -318,12 +327,12 @@ class Record(Displayed):
         for name, (kind, layout) in declared(type(self)).items():
             value = getattr(self, name)
             if isinstance(layout, Array) and layout.attribute and not _missing(value, name in optional):
-                found[layout.name or name] = list(value) if _is_tuple(kind) else value
+                attributes[layout.name or name] = list(value) if _is_tuple(kind) else value
             elif isinstance(layout, Paths) and not layout.listed:
-                found[name] = list(value)
+                attributes[name] = list(value)
             elif isinstance(layout, Within) and value is not None:
-                found |= value.attributes()
-        return found
+                attributes |= value.attributes()
+        return attributes
 
     def to_json(self) -> dict[str, Any]:
         """Return the record as plain data, arrays as nested lists."""
@@ -334,24 +343,24 @@ class Record(Displayed):
 
     def _in_json(self, wanted: tuple[str, ...]) -> dict[str, Any]:
         """Return some fields as plain data."""
-        found = self.plain(wanted)
+        data = self.plain(wanted)
         for name, (_, layout) in declared(type(self)).items():
             value = getattr(self, name)
             if name not in wanted:
                 continue
             if isinstance(layout, Array) and value is not None:
-                for part, values in _parts(np.asarray(value), layout.imaginary).items():
-                    found[(layout.json or layout.name or name) + part] = values.tolist()
-            elif isinstance(layout, Columns):
-                known = (layout.in_json or layout.known)()
-                found |= {layout.prefix + each: values.tolist() for each, values in value.items() if each in known}
-            elif isinstance(layout, Rows):
-                found[name] = [dataclasses.asdict(row) for row in value]
+                for suffix, values in _parts(np.asarray(value), layout.imaginary).items():
+                    data[(layout.json or layout.name or name) + suffix] = values.tolist()
+            elif isinstance(layout, NamedArrays):
+                entries = (layout.in_json or layout.table)()
+                data |= {layout.prefix + key: values.tolist() for key, values in value.items() if key in entries}
+            elif isinstance(layout, RecordRows):
+                data[name] = [dataclasses.asdict(row) for row in value]
             elif isinstance(layout, Paths):
-                found[name] = {path: values.tolist() for path, values in value.items()}
+                data[name] = {path: values.tolist() for path, values in value.items()}
             elif isinstance(layout, Within):
-                found |= value._in_json(layout.json)
-        return found
+                data |= value._in_json(layout.json)
+        return data
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the data set of xarray, which must be installed, that the file opens as."""
@@ -380,42 +389,43 @@ class Record(Displayed):
 
     @classmethod
     def given(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-        """Return the fields in a file by name, but those of its Own."""
-        given: dict[str, Any] = {}
+        """Return the fields in a file by name, except those written by the class itself."""
+        fields: dict[str, Any] = {}
         optional = _optional(cls)
         for field, (kind, layout) in declared(cls).items():
             if isinstance(layout, Array):
-                name, held = layout.name or field, attributes if layout.attribute else values
-                if field in optional and name not in held and f"{name}_real" not in held:
+                name, source = layout.name or field, attributes if layout.attribute else values
+                if field in optional and name not in source and f"{name}_real" not in source:
                     continue
                 if layout.dtype is complex:
-                    given[field] = held[f"{name}_real"] + 1j * held[name + layout.imaginary]
+                    fields[field] = source[f"{name}_real"] + 1j * source[name + layout.imaginary]
                 else:
-                    given[field] = tuple(np.asarray(held[name]).tolist()) if _is_tuple(kind) else held[name]
-            elif isinstance(layout, Columns):
-                given[field] = {
-                    name: store.frozen(array, one.dtype) for name, (array, one) in _named(values, layout).items()
+                    fields[field] = tuple(np.asarray(source[name]).tolist()) if _is_tuple(kind) else source[name]
+            elif isinstance(layout, NamedArrays):
+                fields[field] = {
+                    name: store.frozen(array, entry.dtype)
+                    for name, (array, entry) in _arrays_of(values, layout).items()
                 }
-            elif isinstance(layout, Rows):
+            elif isinstance(layout, RecordRows):
                 of = get_args(kind)[0]
                 if field not in optional or f"{layout.dim}_{next(iter(_columns(of)))}" in values:
-                    given[field] = _rows_of(values, of, layout.dim)
+                    fields[field] = _rows_of(values, of, layout.dim)
             elif isinstance(layout, Ragged):
-                given[field] = _parts_of(values, get_args(kind)[0], layout)
+                fields[field] = _parts_of(values, get_args(kind)[0], layout)
             elif isinstance(layout, Within):
                 of = (get_args(kind) or (kind,))[0]
                 if field not in optional or next(iter(declared(of))) in values:
-                    given[field] = of.of(values, attributes, path)
-            elif isinstance(layout, Paths | Sparse):
-                given[field] = layout.read(field, values, attributes)
+                    fields[field] = of.of(values, attributes, path)
+            elif isinstance(layout, Paths | SparseMatrix):
+                fields[field] = layout.read(field, values, attributes)
             elif isinstance(layout, Own):
-                given |= {field: layout.found(values)} if layout.found else {}
+                fields |= {field: layout.read(values)} if layout.read else {}
             elif (name := _name(field, layout)) in attributes or field not in optional:
                 value = attributes.get(name) if type(None) in get_args(kind) else attributes[name]
                 value = json.loads(value) if isinstance(value, str) and not _is_text(kind) else value
                 coded = layout if isinstance(layout, Coded) else None
-                given[field] = coded.decode(value, path) if coded else _adapter(kind).validate_python(value)
-        return given
+                fields[field] = coded.decode(value, path) if coded else _adapter(kind).validate_python(value)
+        return fields
 
 
 def declared(cls: Any) -> Mapping[str, tuple[Any, Layout]]:
@@ -425,32 +435,34 @@ def declared(cls: Any) -> Mapping[str, tuple[Any, Layout]]:
 
 @cache
 def _declared(cls: type) -> dict[str, tuple[Any, Layout]]:
-    found: dict[str, tuple[Any, Layout]] = {}
+    layouts: dict[str, tuple[Any, Layout]] = {}
     hints = get_type_hints(cls, include_extras=True)
     for item in dataclasses.fields(cls):
         kind, *notes = get_args(hints[item.name]) if get_origin(hints[item.name]) is Annotated else (hints[item.name],)
-        layout = next((note for note in notes if isinstance(note, (Array, *_VARIABLES, Named, Coded, Unit))), None)
-        found[item.name] = (kind, layout)
-    return found
+        layout = next(
+            (note for note in notes if isinstance(note, (Array, *_VARIABLES, Named, Coded, NumberUnit))), None
+        )
+        layouts[item.name] = (kind, layout)
+    return layouts
 
 
 def joined(columns: Sequence[Mapping[str, np.ndarray]], counts: Sequence[int]) -> dict[str, np.ndarray]:
     """Return arrays by name one after the other; nan, or no text, where one of some counts of rows has none."""
-    found = dict[str, np.ndarray]()
-    for name, one in {name: values for each in columns for name, values in each.items()}.items():
-        nothing = "" if one.dtype == object else np.nan
+    arrays = dict[str, np.ndarray]()
+    for name, array in {name: values for table in columns for name, values in table.items()}.items():
+        nothing = "" if array.dtype == object else np.nan
         rows = (
-            each[name] if name in each else np.full((count, *one.shape[1:]), nothing, one.dtype)
-            for each, count in zip(columns, counts, strict=True)
+            table[name] if name in table else np.full((count, *array.shape[1:]), nothing, array.dtype)
+            for table, count in zip(columns, counts, strict=True)
         )
-        found[name] = np.concatenate(list(rows))
-    return found
+        arrays[name] = np.concatenate(list(rows))
+    return arrays
 
 
-def _named(values: Mapping[str, Any], layout: Columns, prefix: str = "") -> dict[str, tuple[Any, Any]]:
-    """Return the arrays of a file that a table knows, with their entries in it, by name."""
-    known = {name: (prefix + layout.prefix + name, one) for name, one in layout.known().items()}
-    return {name: (values[at], one) for name, (at, one) in known.items() if at in values}
+def _arrays_of(values: Mapping[str, Any], layout: NamedArrays, prefix: str = "") -> dict[str, tuple[Any, Any]]:
+    """Return the arrays of a file that a table lists, with their entries in it, by name."""
+    entries = {name: (prefix + layout.prefix + name, entry) for name, entry in layout.table().items()}
+    return {name: (values[at], entry) for name, (at, entry) in entries.items() if at in values}
 
 
 def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any, ...]:
@@ -462,7 +474,7 @@ def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any
         name = prefix + _name(field, layout)
         if isinstance(layout, Array) and layout.dtype is complex and f"{name}_real" in values:
             columns[field] = values[f"{name}_real"] + 1j * values[name + layout.imaginary]
-        elif isinstance(layout, Rows) and f"{prefix}{layout.dim}_{thing}" in values:
+        elif isinstance(layout, RecordRows) and f"{prefix}{layout.dim}_{thing}" in values:
             columns[field] = _rows_of(values, get_args(of)[0], prefix + layout.dim)
         elif name in values:
             columns[field] = values[name]
@@ -475,30 +487,30 @@ def _parts_of(values: Mapping[str, Any], kind: Any, ragged: Ragged) -> tuple[Any
 
 def _has_rows(kind: Any, field: str, dim: str) -> bool:
     layout = declared(kind)[field][1]
-    return isinstance(layout, Rows | Columns) or (isinstance(layout, Array) and layout.dims[0] == dim)
+    return isinstance(layout, RecordRows | NamedArrays) or (isinstance(layout, Array) and layout.dims[0] == dim)
 
 
 def _part(
     values: Mapping[str, Any], kind: Any, ragged: Ragged, columns: Mapping[str, Sequence[Any]], number: int,
-    own: np.ndarray,
+    rows: np.ndarray,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return the fields of one of the parts in a file, whose rows are `own`."""
-    given = dict[str, Any]()
+    """Return the fields of one of the parts in a file; rows: the indices of its own."""
+    fields = dict[str, Any]()
     for field, (of, layout) in declared(kind).items():
-        if isinstance(layout, Columns):
-            named = _named(values, layout, ragged.prefix)
-            given[field] = {name: store.frozen(array[own], one.dtype) for name, (array, one) in named.items()}
+        if isinstance(layout, NamedArrays):
+            named = _arrays_of(values, layout, ragged.prefix)
+            fields[field] = {name: store.frozen(array[rows], entry.dtype) for name, (array, entry) in named.items()}
         elif field not in columns:
             continue
-        elif isinstance(layout, Rows):
+        elif isinstance(layout, RecordRows):
             whose = values[f"{ragged.prefix}{layout.dim}_{ragged.thing}"]
-            given[field] = tuple(columns[field][place] for place in np.flatnonzero(whose == number))
+            fields[field] = tuple(columns[field][index] for index in np.flatnonzero(whose == number))
         elif isinstance(layout, Array) and layout.dims[0] == ragged.dim:
-            given[field] = store.frozen(np.asarray(columns[field])[own], layout.dtype)
+            fields[field] = store.frozen(np.asarray(columns[field])[rows], layout.dtype)
         else:
             value = np.asarray(columns[field][number], _column(of, layout)[0])
-            given[field] = tuple(value.tolist()) if _is_tuple(of) else value.item() if value.ndim == 0 else value
-    return given
+            fields[field] = tuple(value.tolist()) if _is_tuple(of) else value.item() if value.ndim == 0 else value
+    return fields
 
 
 def _name(field: str, layout: Layout) -> str:
@@ -510,7 +522,7 @@ def _column(kind: Any, layout: Layout) -> tuple[Any, str, tuple[str, ...]]:
     if isinstance(layout, Array):
         return layout.dtype, layout.unit, layout.dims
     dtype = object if kind is str else np.int64 if kind is int else kind
-    return dtype, layout.unit if isinstance(layout, Unit) else "1", ()
+    return dtype, layout.unit if isinstance(layout, NumberUnit) else "1", ()
 
 
 def _parts(values: np.ndarray, imaginary: str) -> dict[str, np.ndarray]:
@@ -519,9 +531,9 @@ def _parts(values: np.ndarray, imaginary: str) -> dict[str, np.ndarray]:
 
 
 def _is_frozen(value: Any, dtype: Any) -> bool:
-    """Whether a value is what `store.frozen` returns, so that records that are made of others need no copies."""
-    own = isinstance(value, np.ndarray) and value.base is None and not value.flags.writeable
-    return own and value.dtype == dtype and value.flags.c_contiguous
+    """Whether a value is a result of `store.frozen`, so that records made from other records need no copies."""
+    frozen = isinstance(value, np.ndarray) and value.base is None and not value.flags.writeable
+    return frozen and value.dtype == dtype and value.flags.c_contiguous
 
 
 def _missing(value: Any, optional: bool) -> bool:
@@ -540,7 +552,7 @@ def _row_variables(
     """Return the variables of rows of a class."""
     columns, optional = _columns(kind), _optional(kind)
     if all(getattr(row, name) == getattr(kind, name) for row in rows for name in optional):
-        columns = {name: one for name, one in columns.items() if name not in optional}
+        columns = {name: column for name, column in columns.items() if name not in optional}
     return {
         f"{dim}_{name}": store.Variable(
             np.array([getattr(row, name) for row in rows], dtype), (dim, *dims), unit_of(unit)
@@ -574,9 +586,9 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def _is_tuple(kind: Any) -> bool:
-    """Whether a type is that of a tuple, or of None else."""
+    """Whether a type is a tuple, or a tuple or None."""
     kinds = get_args(kind) if type(None) in get_args(kind) else (kind,)
-    return any(get_origin(one) is tuple for one in kinds)
+    return any(get_origin(option) is tuple for option in kinds)
 
 
 def _is_text(kind: Any) -> bool:

@@ -37,9 +37,9 @@ making_schema = ContextVar("making_schema", default=False)
 class FileKind(NamedTuple):
     """A kind of input file.
 
-    name; place: of its record, "module:class", loaded when it is wanted; tables: those that tell it from other kinds;
+    name; place: of its record, "module:class", loaded when needed; tables: tables that distinguish it from other kinds;
     completed: "module:function" that takes the schema of the record and adds other ways to write the same, "": none;
-    command: that such a file is for in the first place, "": of its name.
+    command: main command for such a file, "": of its name.
     """
 
     name: str
@@ -55,7 +55,7 @@ class FileKind(NamedTuple):
 
     @property
     def schema(self) -> dict[str, Any]:
-        """JSON Schema of the record: every key with what it holds."""
+        """JSON Schema of the record: every key with its meaning."""
         return schema(self.record)
 
     @property
@@ -64,8 +64,8 @@ class FileKind(NamedTuple):
         return _at(self.completed)(self.schema) if self.completed else self.schema
 
 
-def _at(place: str) -> Any:
-    module, name = place.split(":")
+def _at(address: str) -> Any:
+    module, name = address.split(":")
     return getattr(import_module(module), name)
 
 
@@ -76,18 +76,18 @@ def schema(record: Any) -> dict[str, Any]:
     """
     token = making_schema.set(True)
     try:
-        made: dict[str, Any] = TypeAdapter(record).json_schema(schema_generator=_Generator)
+        generated: dict[str, Any] = TypeAdapter(record).json_schema(schema_generator=_Generator)
     finally:
         making_schema.reset(token)
-    return {"$schema": DIALECT} | made
+    return {"$schema": DIALECT} | generated
 
 
 def field_docstrings(record: type) -> dict[str, str]:
     """Return the docstrings after the fields of a class, or members of an Enum, its bases' included, by their names."""
-    found: dict[str, str] = {}
+    docstrings: dict[str, str] = {}
     for base in reversed(record.__mro__):
-        found |= _literals(base.__module__).get(base.__qualname__, {})
-    return found
+        docstrings |= _literals(base.__module__).get(base.__qualname__, {})
+    return docstrings
 
 
 def unit_in(text: str) -> str | None:
@@ -112,8 +112,10 @@ def constants(node: dict[str, Any]) -> dict[str, str]:
 def table_at(schema: dict[str, Any], node: dict[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the schema of a table among the variants that a node stands for: the one whose constants it has."""
     tables = [option for option in options(schema, node) if option.get("type") == "object"]
-    fitting = [one for one in tables if all(table.get(key) == value for key, value in constants(one).items())]
-    return max(fitting, key=lambda one: len(constants(one))) if fitting else next(iter(tables), {})
+    fitting = [
+        variant for variant in tables if all(table.get(key) == value for key, value in constants(variant).items())
+    ]
+    return max(fitting, key=lambda variant: len(constants(variant))) if fitting else next(iter(tables), {})
 
 
 def key_in(table: dict[str, Any], key: str) -> dict[str, Any]:
@@ -150,13 +152,13 @@ class _Generator(GenerateJsonSchema):
         return super().default_schema(schema)
 
     def tagged_union_schema(self, schema: core_schema.TaggedUnionSchema) -> JsonSchemaValue:
-        """Return the union, whose tables must say which of its records they are, defaults or not."""
-        made = super().tagged_union_schema(schema)
+        """Return the union, whose tables must name their record, even if it is the default."""
+        union = super().tagged_union_schema(schema)
         tag = schema["discriminator"]
         if isinstance(tag, str):
-            for option in made["oneOf"]:
+            for option in union["oneOf"]:
                 require(self.resolve_ref_schema(option), tag)
-        return made
+        return union
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
@@ -189,16 +191,16 @@ def _literals(module: str) -> dict[str, dict[str, str]]:
     file = getattr(sys.modules.get(module), "__file__", None)
     if file is None or not file.endswith(".py"):
         return {}
-    found: dict[str, dict[str, str]] = {}
-    _collect(ast.parse(Path(file).read_text(encoding="utf-8")).body, "", found)
-    return found
+    docstrings: dict[str, dict[str, str]] = {}
+    _collect(ast.parse(Path(file).read_text(encoding="utf-8")).body, "", docstrings)
+    return docstrings
 
 
-def _collect(body: list[ast.stmt], prefix: str, found: dict[str, dict[str, str]]) -> None:
+def _collect(body: list[ast.stmt], prefix: str, docstrings: dict[str, dict[str, str]]) -> None:
     for statement in body:
         if isinstance(statement, ast.ClassDef):
             name = f"{prefix}{statement.name}"
-            found[name] = {
+            docstrings[name] = {
                 target.id: " ".join(cleandoc(text.value.value).split())
                 for field, text in zip(statement.body, statement.body[1:], strict=False)
                 if isinstance(field, ast.AnnAssign | ast.Assign)  # a member of an Enum has no annotation
@@ -207,4 +209,4 @@ def _collect(body: list[ast.stmt], prefix: str, found: dict[str, dict[str, str]]
                 for target in (field.targets if isinstance(field, ast.Assign) else [field.target])
                 if isinstance(target, ast.Name)
             }  # fmt: skip
-            _collect(statement.body, f"{name}.", found)
+            _collect(statement.body, f"{name}.", docstrings)

@@ -22,9 +22,9 @@ def within_shape(matrix: Any) -> Any:
         if matrix.format in ("csr", "csc", "bsr"):
             matrix.check_format(full_check=True)
         elif hasattr(matrix, "col"):
-            for places, size in zip((matrix.row, matrix.col), matrix.shape, strict=True):
-                if places.size and not (places.min() >= 0 and places.max() < size):
-                    raise ValueError(f"indices {places.min()} to {places.max()} for {size} rows or columns")
+            for indices, size in zip((matrix.row, matrix.col), matrix.shape, strict=True):
+                if indices.size and not (indices.min() >= 0 and indices.max() < size):
+                    raise ValueError(f"indices {indices.min()} to {indices.max()} for {size} rows or columns")
         elif matrix.format == "dia" and np.any(abs(np.asarray(matrix.offsets)) >= max(matrix.shape)):
             raise ValueError("a diagonal outside the shape")
     except ValueError as error:

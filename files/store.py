@@ -1,6 +1,6 @@
 """Records on disk: one HDF5 layout for every result, readable by xarray and netCDF tools; tables and plain data.
 
-The ground floor of the project: it knows h5py and nothing else of ours, so that every stage may write its records the
+The lowest layer of the project: it imports h5py and no other folder, so that every stage may write its records the
 same way. A record is a set of named variables with dimensions and units, and flat attributes. h5py takes 12 MB: it is
 imported where a file is read or written.
 Dimension scales take ten lines of h5py; h5netcdf 1.8.2 would replace these only, as another dependency, and writes a
@@ -43,7 +43,7 @@ SCHEMA_VERSION = 1
 _TRACK_ORDER = False
 #: name of a dimension without a coordinate in netCDF-4
 _NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
-#: where links stand for the files that processes have open
+#: folder of links to the open files of processes
 _OPEN_FILES = Path("/proc")
 #: the last bytes of a record's file, after HDF5's, which passes over them and drops them at a change
 _SEAL, _SEAL_LENGTH = "\nvanedamp {:08x}\n", 19
@@ -166,9 +166,9 @@ def file_stamp(path: str | os.PathLike[str]) -> int:
     file = Path(path)
     if not file.is_file():
         return 0
-    found = file.stat()
+    status = file.stat()
     # copies and archives keep the time of the content; the time of the change cannot be set
-    return hash((found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns))
+    return hash((status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns))
 
 
 def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
@@ -197,12 +197,12 @@ def write_json(path: str | os.PathLike[str], data: Any) -> None:
 
 
 def json_text(data: Any) -> str:
-    """Return finite plain data as JSON. Raises ValueError for nan and infinity, which JSON does not know."""
+    """Return finite plain data as JSON. Raises ValueError for nan and infinity, which JSON lacks."""
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
 def digest(path: str | os.PathLike[str]) -> str:
-    """Return the SHA-256 of a file's bytes, which says what file a result comes from."""
+    """Return the SHA-256 of a file's bytes, which identifies the source of a result."""
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
@@ -269,10 +269,10 @@ def dataset(variables: Mapping[str, Variable], attributes: Mapping[str, Any]) ->
     """Return a record as an xarray.Dataset, as its file opens. Raises ModuleNotFoundError without xarray."""
     import xarray
 
-    made = {
+    data_vars = {
         name: (tuple(item.dims), np.asarray(item.values), {"units": item.units}) for name, item in variables.items()
     }
-    return xarray.Dataset(made, attrs=_texts(attributes))
+    return xarray.Dataset(data_vars, attrs=_texts(attributes))
 
 
 def _texts(attributes: Mapping[str, Any]) -> dict[str, Any]:
@@ -294,19 +294,19 @@ def clear_leftovers(path: str | os.PathLike[str]) -> None:
 
 def load(path: str | os.PathLike[str], kind: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Read a record: (variables by name as arrays, attributes). Raises StoreError with the file and the reason."""
-    found, variables = _content(path)
-    if found.get("kind") != kind:
-        raise StoreError(f"{path}: holds {found.get('kind') or 'no record of ours'}, expected {kind}")
+    attributes, variables = _content(path)
+    if attributes.get("kind") != kind:
+        raise StoreError(f"{path}: holds {attributes.get('kind') or 'no record of ours'}, expected {kind}")
     values = {name: variable.values for name, variable in variables.items()}
-    return _Fields(path, values), _attributes(path, found)
+    return _RecordFields(path, values), _attributes(path, attributes)
 
 
 def load_any(path: str | os.PathLike[str]) -> tuple[str, dict[str, Variable], dict[str, Any]]:
     """Read a record of any kind: (kind, variables with dimensions and units, attributes). Raises StoreError."""
-    found, variables = _content(path, dimensions=True)
-    if found.get("kind") is None:
+    attributes, variables = _content(path, dimensions=True)
+    if attributes.get("kind") is None:
         raise StoreError(f"{path}: holds no record of ours")
-    return str(found["kind"]), variables, _attributes(path, found)
+    return str(attributes["kind"]), variables, _attributes(path, attributes)
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
@@ -370,7 +370,7 @@ def _read_all(path: str | os.PathLike[str], dimensions: bool) -> tuple[dict[str,
 
 
 def _sealed(path: str | os.PathLike[str]) -> bool:
-    """Say whether a file ends with the checksum of its content; records before it was introduced do not.
+    """Whether a file ends with the checksum of its content; records before its introduction do not.
 
     Raises StoreError where the checksum is another's: the file has been damaged since.
     """
@@ -394,12 +394,12 @@ def _checked(path: str, stamp: int) -> bool:
     return True
 
 
-def _attributes(path: str | os.PathLike[str], found: dict[str, Any]) -> dict[str, Any]:
+def _attributes(path: str | os.PathLike[str], attributes: dict[str, Any]) -> dict[str, Any]:
     with decoding(path):
-        version = int(found.get("schema_version", 0))
+        version = int(attributes.get("schema_version", 0))
     if version > SCHEMA_VERSION:
         raise StoreError(f"{path}: schema version {version} is newer than {SCHEMA_VERSION}; update vanedamp")
-    return _Fields(path, found)
+    return _RecordFields(path, attributes)
 
 
 def _dimensions(dataset: h5py.Dataset, name: str) -> tuple[str, ...]:
@@ -412,7 +412,7 @@ def _without_coordinate(dataset: h5py.Dataset) -> bool:
     return bytes(dataset.attrs.get("NAME", b"")).startswith(_NO_COORDINATE.encode())
 
 
-class _Fields(dict[str, Any]):
+class _RecordFields(dict[str, Any]):
     """The fields of a record by name; a missing one raises StoreError with the file."""
 
     def __init__(self, path: str | os.PathLike[str], values: Mapping[str, Any]) -> None:
@@ -431,7 +431,7 @@ def frozen(array: Any, dtype: Any = float) -> np.ndarray:
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """Return a view of an array that cannot be written through, as frozen records hold what nobody changes any more."""
+    """Return a read-only view of an array, as held by frozen records."""
     view = array.view()
     view.setflags(write=False)
     return view
@@ -445,8 +445,8 @@ def _dimension_lengths(variables: Mapping[str, Variable]) -> dict[str, int]:
             raise ValueError(f"{name}: {len(variable.dims)} dimensions named for an array of shape {shape}")
         for dimension, length in zip(variable.dims, shape, strict=True):
             if lengths.setdefault(dimension, length) != length:
-                other = lengths[dimension]
-                raise ValueError(f"{name}: dimension {dimension} has length {length} here and {other} elsewhere")
+                earlier = lengths[dimension]
+                raise ValueError(f"{name}: dimension {dimension} has length {length} here and {earlier} elsewhere")
     return lengths
 
 

@@ -70,14 +70,14 @@ def _three(direction: Any) -> Any:
 Direction = Annotated[tuple[Real, Real, Real], BeforeValidator(_three)]
 
 
-def _each(value: Any) -> Any:
+def _along_axes(value: Any) -> Any:
     """Return one number for each of three axes, which a single one stands for."""
     return [value] * 3 if isinstance(value, int | float) else value
 
 
 _Axes = tuple[NonNegative, NonNegative, NonNegative]
 #: numbers along x, y and z, or one for all three
-Axes = Annotated[_Axes, BeforeValidator(_each, json_schema_input_type=NonNegative | _Axes)]
+Axes = Annotated[_Axes, BeforeValidator(_along_axes, json_schema_input_type=NonNegative | _Axes)]
 
 
 class InputError(VanedampError):
@@ -101,19 +101,19 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     if _depth(data) > _DEEPEST:
         raise InputError(f"{path}: its tables are nested too deeply; at most {_DEEPEST} levels")
     if r"\u0000" in text or r"\U00000000" in text:  # no result could hold it
-        for place in _with_zero(data, []):
-            raise InputError(f"{path}: {dotted(place)!r}: holds a zero character; leave \\u0000 out")
+        for path_inside in _with_zero(data, []):
+            raise InputError(f"{path}: {dotted(path_inside)!r}: holds a zero character; leave \\u0000 out")
     return data
 
 
-def _with_zero(data: Any, place: list[Any]) -> Iterator[list[Any]]:
+def _with_zero(data: Any, path: list[Any]) -> Iterator[list[Any]]:
     """Yield the places of names and texts with a zero character."""
     if isinstance(data, str) and "\0" in data:
-        yield place
+        yield path
     for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
         if isinstance(key, str) and "\0" in key:
-            yield [*place, key]
-        yield from _with_zero(value, [*place, key])
+            yield [*path, key]
+        yield from _with_zero(value, [*path, key])
 
 
 def _depth(data: Any) -> int:
@@ -136,8 +136,8 @@ def validate(record: type[T], data: Mapping[str, Any], source: str) -> T:
         return adapter.validate_python(data)
     except ValidationError as error:
         # a misspelt key is missing, too: its own complaint is the one that helps
-        found = sorted(error.errors(), key=lambda entry: entry["type"] not in _UNKNOWN)
-        raise InputError(f"{source}: {_explain(adapter, found[0], data)}") from None
+        errors = sorted(error.errors(), key=lambda entry: entry["type"] not in _UNKNOWN)
+        raise InputError(f"{source}: {_explain(adapter, errors[0], data)}") from None
 
 
 def validated_or_none(record: type[T], data: Mapping[str, Any]) -> T | None:
@@ -153,8 +153,10 @@ def lists_for_numbers(record: type[T], data: Mapping[str, Any]) -> list[list[Any
     try:
         _adapter(record).validate_python(data)  # type: ignore[arg-type]
     except ValidationError as error:
-        found = [one for one in error.errors() if one["type"] == "float_type" and isinstance(one["input"], list)]
-        return [_path_in_data(one["loc"], data, names_absent_key=False) for one in found]
+        errors = [
+            entry for entry in error.errors() if entry["type"] == "float_type" and isinstance(entry["input"], list)
+        ]
+        return [_path_in_data(entry["loc"], data, names_absent_key=False) for entry in errors]
     return []
 
 
@@ -214,13 +216,13 @@ def _unknown(schema: dict[str, Any], location: tuple[Any, ...], name: str) -> st
     """Explain a key that a table does not have: the variants that have it, or the keys that this one may have."""
     variants = _nodes(schema, location[:-1])
     # of several variants of a table the one at hand is a step of the location, by the value that distinguishes them
-    own = [node for node in variants if location[-2:-1] and location[-2] in constants(node).values()] or variants
+    fitting = [node for node in variants if location[-2:-1] and location[-2] in constants(node).values()] or variants
     owners = [pair for node in variants if name in node.get("properties", {}) for pair in constants(node).items()]
     if owners:
-        (tag, mine), *_ = constants(own[0]).items()
+        (tag, mine), *_ = constants(fitting[0]).items()
         others = " or ".join(f'{tag} = "{value}"' for tag, value in owners)
         return f'belongs to {others}, not to {tag} = "{mine}"'
-    return f"unknown key; {nearest(name, sorted({key for node in own for key in node.get('properties', {})}))}"
+    return f"unknown key; {nearest(name, sorted({key for node in fitting for key in node.get('properties', {})}))}"
 
 
 def _path_in_data(location: tuple[Any, ...], data: Any, names_absent_key: bool) -> list[Any]:

@@ -21,7 +21,7 @@ from vanedamp.files.reference import FileKind, key_in, options, table_at
 from vanedamp.files.store import replacing
 from vanedamp.files.toml_input import plain
 
-#: widest line that a comment at its end may make; longer comments stand above
+#: widest line with a comment at its end; longer comments go above
 _WIDTH = 120
 #: width of the lines of a long list
 _LINE = 96
@@ -83,30 +83,30 @@ class _Writer(NamedTuple):
         return tomlkit.dumps(document)
 
     def fill(
-        self, place: Container | Table, data: Mapping[str, Any], node: dict[str, Any], told: set[str], name: str
+        self, parent: Container | Table, data: Mapping[str, Any], node: dict[str, Any], explained: set[str], name: str
     ) -> None:
-        """Add the keys of a table to a place in the document, values first, then tables.
+        """Add the keys of a table to the document or to a table, values first, then tables.
 
-        told: keys that need no further comment, since a table of the same list explains them; this table's keys join
-        them. name: the dotted one of the table.
+        explained: keys that need no comment, since a table of the same list has explained them; this table's keys are
+        added. name: the dotted name of the table.
         """
-        _comment(place, self.notes.get(name, ""))
+        _comment(parent, self.notes.get(name, ""))
         if not name and name in self.notes:
-            place.add(tomlkit.nl())
+            parent.add(tomlkit.nl())
         table = table_at(self.schema, node, data)
         alike = isinstance(table.get("additionalProperties"), dict)  # tables by names of the user's
-        told_inside: set[str] = set()
-        given = {key: (value, key_in(table, key)) for key, value in data.items() if value is not None}
-        tables = {key for key, (value, node) in given.items() if self.headed(value, node)}
-        for key in sorted(given, key=lambda key: key in tables):
-            value, node = given[key]
-            text = "" if key in told else node.get("description", "")
+        explained_inside: set[str] = set()
+        entries = {key: (value, key_in(table, key)) for key, value in data.items() if value is not None}
+        tables = {key for key, (value, node) in entries.items() if self.headed(value, node)}
+        for key in sorted(entries, key=lambda key: key in tables):
+            value, node = entries[key]
+            text = "" if key in explained else node.get("description", "")
             if key in tables:
-                inner = told_inside if alike else set()
-                place.add(key, self.tables(value, text, node, inner, f"{name}.{key}" if name else key))
+                inner = explained_inside if alike else set()
+                parent.add(key, self.tables(value, text, node, inner, f"{name}.{key}" if name else key))
             else:
-                _add(place, key, _item(value), text)
-        told |= set(given)
+                _add(parent, key, _item(value), text)
+        explained |= set(entries)
 
     def headed(self, value: Any, node: dict[str, Any]) -> bool:
         """Return whether a value is a table with a heading, or a list of them."""
@@ -114,39 +114,41 @@ class _Writer(NamedTuple):
             return all(isinstance(entry, Mapping) for entry in value)
         return isinstance(value, Mapping) and not table_at(self.schema, node, value).get("x-inline", False)
 
-    def tables(self, value: Any, text: str, node: dict[str, Any], told: set[str], name: str) -> Item:
+    def tables(self, value: Any, text: str, node: dict[str, Any], explained: set[str], name: str) -> Item:
         """Return a table or a list of them."""
         if isinstance(value, Mapping):
-            return self.table(value, text, node, told, name)
-        items: dict[str, Any] = next((one["items"] for one in options(self.schema, node) if "items" in one), {})
+            return self.table(value, text, node, explained, name)
+        items: dict[str, Any] = next(
+            (option["items"] for option in options(self.schema, node) if "items" in option), {}
+        )
         tables = tomlkit.aot()
         for entry in value:
-            tables.append(self.table(entry, "" if len(tables) else text, items, told, name))
+            tables.append(self.table(entry, "" if len(tables) else text, items, explained, name))
         return tables
 
-    def table(self, value: Mapping[str, Any], text: str, node: dict[str, Any], told: set[str], name: str) -> Table:
+    def table(self, value: Mapping[str, Any], text: str, node: dict[str, Any], explained: set[str], name: str) -> Table:
         """Return a table with its heading, which one of tables only does not need."""
         inner = bool(value) and all(isinstance(entry, Mapping) for entry in value.values())
         table = tomlkit.table(is_super_table=inner and name not in self.notes)
         if text:
             table.comment(text)
-        self.fill(table, value, node, told, name)
+        self.fill(table, value, node, explained, name)
         return table
 
 
-def _comment(place: Container | Table, text: str) -> None:
+def _comment(parent: Container | Table, text: str) -> None:
     """Add lines with a comment."""
     for line in textwrap.wrap(text, _WIDTH - 2, break_on_hyphens=False):
-        place.add(tomlkit.comment(line))
+        parent.add(tomlkit.comment(line))
 
 
-def _add(place: Container | Table, key: str, item: Item, text: str) -> None:
+def _add(parent: Container | Table, key: str, item: Item, text: str) -> None:
     """Add a value with its comment at the end of the line, or above where that is too long."""
     if text and len(f"{key} = {item.as_string()} # {text}") > _WIDTH:
-        _comment(place, text)
+        _comment(parent, text)
     elif text:
         item.comment(text)
-    place.add(key, item)
+    parent.add(key, item)
 
 
 def _item(value: Any) -> Item:
@@ -171,7 +173,7 @@ def _array(items: list[Item]) -> Array:
         return array
     line: list[Item] = []
     for item in items:
-        if sum(len(one.as_string()) + 2 for one in [*line, item]) > _LINE:
+        if sum(len(entry.as_string()) + 2 for entry in [*line, item]) > _LINE:
             array.add_line(*line)
             line = []
         line.append(item)

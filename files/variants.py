@@ -1,4 +1,4 @@
-"""Tables of a file that are one of several records, which one key names: ours, and those that other code adds."""
+"""Tables of a file that are one of several records, named by a key: ours, and records added by other code."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Variants(Generic[Base]):
         self._loaded = False
 
     def register(self, record: type[Record]) -> type[Record]:
-        """Add a record to those that a file may name; may decorate the class.
+        """Add a record that files may name; may decorate the class.
 
         An installed package does the same without a call, for the command line too, in its pyproject.toml:
 
@@ -44,8 +44,8 @@ class Variants(Generic[Base]):
                 f"{record!r}: is no {self._kind}: derive a dataclass from {base.__name__}, "
                 f"with a default of `{self._key}`"
             )
-        other = self._records.setdefault(field.default, record)
-        if other is not record:
+        registered = self._records.setdefault(field.default, record)
+        if registered is not record:
             raise ExtensionError(
                 f"{record.__module__}.{record.__qualname__}: there is a {self._kind} named {field.default} already; "
                 "name it otherwise"
@@ -54,7 +54,7 @@ class Variants(Generic[Base]):
         return record
 
     def _union(self) -> tuple[CoreSchema, SchemaValidator, SchemaSerializer]:
-        """Return the union of the records: its schema, what validates it and what serialises it."""
+        """Return the union of the records: its schema, validator and serialiser."""
         if not self._loaded:
             for record in added_parts(self._kind, self._group).values():
                 self.register(record)

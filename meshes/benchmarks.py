@@ -17,7 +17,7 @@ _FACES = ("root", "tip", "left", "right", "bottom", "top")
 
 
 @dataclass(frozen=True)
-class Block:
+class TaperedBlock:
     """A block from x = 0 to `length`, symmetric about y = 0, from z = 0 to `thickness`.
 
     Facet groups: `root` (x = 0), `tip` (x = length), `left` and `right` (the faces of negative and positive y),
@@ -60,7 +60,7 @@ class Block:
             check_size(self.element_size, self.length * width * self.thickness)
 
 
-def build(block: Block, path: str | os.PathLike[str]) -> Path:
+def build(block: TaperedBlock, path: str | os.PathLike[str]) -> Path:
     """Mesh the block and write it as gmsh 4.1 text. Returns the path."""
     with msh.session("block"):
         volume = _solid(block)
@@ -76,7 +76,7 @@ def build(block: Block, path: str | os.PathLike[str]) -> Path:
         return msh.write(path)
 
 
-def _solid(block: Block) -> int:
+def _solid(block: TaperedBlock) -> int:
     geo = gmsh.model.geo
     root, tip = 0.5 * block.width, 0.5 * (block.tip_width or block.width)
     corners = [geo.addPoint(x, y, 0.0) for x, y in ((0, -root), (block.length, -tip), (block.length, tip), (0, root))]
@@ -95,7 +95,7 @@ def _solid(block: Block) -> int:
     return next(tag for dimension, tag in solid if dimension == 3)
 
 
-def _faces(block: Block, volume: int) -> list[int]:
+def _faces(block: TaperedBlock, volume: int) -> list[int]:
     """Return the surfaces in the order of `_FACES`, found by the middles of their bounding boxes."""
     surfaces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
     boxes = {tag: gmsh.model.getBoundingBox(2, tag) for tag in surfaces}

@@ -110,13 +110,13 @@ def build(sector: Sector, path: str | os.PathLike[str]) -> Path:
     kinds = _kinds(sector, lines)
     with msh.session("sector"):
         cells = [(name, np.argwhere(kinds == kind), (0, 1, 2)) for name, kind in (("disk", _DISK), ("blade", _BLADE))]
-        parts = [
+        blocks = [
             (name, len(across), *_elements(first, sector.order, kinds.shape, across))
             for name, first, across in [*cells, *_faces(sector, lines, kinds)]
             if len(first)
         ]
-        used = np.unique(np.concatenate([nodes.ravel() for _, dimension, _, nodes in parts if dimension == 3]))
-        for tag, (name, dimension, kind, nodes) in enumerate(parts, 1):
+        used = np.unique(np.concatenate([nodes.ravel() for _, dimension, _, nodes in blocks if dimension == 3]))
+        for tag, (name, dimension, kind, nodes) in enumerate(blocks, 1):
             gmsh.model.addDiscreteEntity(dimension, tag)
             gmsh.model.addPhysicalGroup(dimension, [tag], name=name)
             if tag == 1:  # all nodes belong to the disk
@@ -154,12 +154,12 @@ def _divided(breaks: list[float], size: float) -> np.ndarray:
     """Return the breaks, ascending, and between them as many even divisions as a size needs."""
     ends = np.unique(breaks)
     counts = np.maximum(np.ceil(np.diff(ends) / size - 1e-9), 1).astype(int)
-    parts = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
-    return np.concatenate([*parts, ends[-1:]])
+    pieces = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
+    return np.concatenate([*pieces, ends[-1:]])
 
 
 def _kinds(sector: Sector, lines: list[np.ndarray]) -> np.ndarray:
-    """Return what every cell of the grid is."""
+    """Return the kind of every cell of the grid."""
     radii, angles, heights = np.meshgrid(*(0.5 * (line[:-1] + line[1:]) for line in lines), indexing="ij")
     angles, heights = np.abs(angles), np.abs(heights)
     blade = (angles < _angle(sector, sector.blade_thickness)) & (heights < 0.5 * sector.axial_width)
@@ -174,19 +174,19 @@ def _kinds(sector: Sector, lines: list[np.ndarray]) -> np.ndarray:
 def _faces(sector: Sector, lines: list[np.ndarray], kinds: np.ndarray) -> list[tuple[str, np.ndarray, tuple[int, ...]]]:
     """Return the facet groups: name, first grid point of every facet, and the two directions in which it extends."""
     rim = int(np.searchsorted(lines[0], sector.outer_radius))
-    found: list[tuple[str, int, int, int, int | None]] = [
+    sides: list[tuple[str, int, int, int, int | None]] = [
         ("low", 1, -1, _OUTSIDE, 0), ("high", 1, 1, _OUTSIDE, len(lines[1]) - 1), ("bore", 0, -1, _OUTSIDE, 0),
         ("rim", 0, 1, _OUTSIDE, rim),
     ]  # fmt: skip
     if sector.blade_length:
-        found.append(("tip", 0, 1, _OUTSIDE, len(lines[0]) - 1))
+        sides.append(("tip", 0, 1, _OUTSIDE, len(lines[0]) - 1))
     if sector.cavity_length:
         walls = (("left", 1, 1), ("right", 1, -1), ("floor", 0, -1), ("roof", 0, 1))
-        found += [(f"cavity_{name}", axis, side, _CAVITY, None) for name, axis, side in walls]
+        sides += [(f"cavity_{name}", axis, side, _CAVITY, None) for name, axis, side in walls]
     groups = []
     solid = np.pad((kinds == _DISK) | (kinds == _BLADE), 1)
     beyond = np.pad(kinds, 1)
-    for name, axis, side, neighbour, plane in found:
+    for name, axis, side, neighbour, plane in sides:
         cells = np.argwhere(solid & (np.roll(beyond, -side, axis) == neighbour)) - 1
         cells[:, axis] += side == 1  # the grid plane of the facet
         if plane is not None:
@@ -199,9 +199,9 @@ def _faces(sector: Sector, lines: list[np.ndarray], kinds: np.ndarray) -> list[t
 def _elements(first: np.ndarray, order: int, shape: tuple[int, ...], across: tuple[int, ...]) -> tuple[int, np.ndarray]:
     """Return gmsh's type and the node tags (m, k) of elements from their first grid points (m, 3)."""
     kind = gmsh.model.mesh.getElementType("Hexahedron" if len(across) == 3 else "Quadrangle", order)
-    _, _, _, count, places, _ = gmsh.model.mesh.getElementProperties(kind)
+    _, _, _, count, coordinates, _ = gmsh.model.mesh.getElementProperties(kind)
     offsets = np.zeros((count, 3), dtype=int)
-    offsets[:, across] = np.rint((np.reshape(places, (count, -1)) + 1.0) * 0.5 * order)
+    offsets[:, across] = np.rint((np.reshape(coordinates, (count, -1)) + 1.0) * 0.5 * order)
     points = order * first[:, None, :] + offsets
     return kind, 1 + np.ravel_multi_index(tuple(np.moveaxis(points, 2, 0)), [order * size + 1 for size in shape])
 

@@ -139,21 +139,21 @@ def _box(parameters: VaneCluster, angle: float, back: float, size: tuple[float, 
 def facets(parameters: VaneCluster) -> dict[str, list[int]]:
     """Return the facet groups, found by the position of their surfaces."""
     surfaces = [tag for _, tag in gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)]
-    found = {
+    groups = {
         "clamp": [tag for tag in surfaces if _on_cylinder(tag, parameters.outer_radius)],
         "shroud": [tag for tag in surfaces if _on_cylinder(tag, parameters.inner_radius)],
     }
     centres = {tag: np.array(gmsh.model.occ.getCenterOfMass(2, tag)) for tag in surfaces}
-    found |= _ends(parameters, centres)
+    groups |= _ends(parameters, centres)
     for number, angle in enumerate(parameters.cavity_angles(), start=1):
         for side, tags in _walls(parameters, angle, centres).items():
             # a tied body may cover a wall
             if tags or not any(parameters.damper_size):
-                found[f"c{number}_{side}"] = tags
-    empty = [name for name, tags in found.items() if not tags]
+                groups[f"c{number}_{side}"] = tags
+    empty = [name for name, tags in groups.items() if not tags]
     if empty:
         raise ParameterError(f"cavity_width: no surface found for facet groups {', '.join(empty)}")
-    return found
+    return groups
 
 
 def _walls(parameters: VaneCluster, angle: float, centres: dict[int, np.ndarray]) -> dict[str, list[int]]:
@@ -163,11 +163,11 @@ def _walls(parameters: VaneCluster, angle: float, centres: dict[int, np.ndarray]
     middle = np.array([0.5 * parameters.axial_length - half[0], 0.0, parameters.cavity_radius])
     walls: dict[str, list[int]] = {"left": [], "right": [], "floor": [], "roof": []}
     for tag, (x, y, z) in centres.items():
-        place = np.array([x, y * cosine - z * sine, y * sine + z * cosine]) - middle
-        inside = np.abs(place) < half - _TOLERANCE
+        offset = np.array([x, y * cosine - z * sine, y * sine + z * cosine]) - middle
+        inside = np.abs(offset) < half - _TOLERANCE
         for side, axis, sign in (("left", 1, -1), ("right", 1, 1), ("floor", 2, -1), ("roof", 2, 1)):
             others = np.delete(inside, axis)
-            if others.all() and abs(place[axis] - sign * half[axis]) < _TOLERANCE:
+            if others.all() and abs(offset[axis] - sign * half[axis]) < _TOLERANCE:
                 walls[side].append(tag)
     return walls
 

@@ -1,4 +1,4 @@
-"""Linear algebra common to modes and reduced models, in numpy: Ritz values, signs of shapes, symmetric parts, turns."""
+"""Linear algebra common to modes and reduced models, in numpy: Ritz values, signs, symmetric parts, rotations."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ MOVES = 0.01
 
 def symmetric_part(matrix: Matrix) -> Matrix:
     """Return (A + A^T) / 2 of a dense or sparse matrix."""
-    given: Any = matrix
-    part: Matrix = 0.5 * (given + given.T)
-    return part
+    dense: Any = matrix
+    half: Matrix = 0.5 * (dense + dense.T)
+    return half
 
 
 def hermitian_part(matrix: np.ndarray) -> np.ndarray:
@@ -42,10 +42,10 @@ def orthonormal(fields: np.ndarray, mass: Any, known: Sequence[np.ndarray] = ())
     out: j may be zero.
     """
     norms = np.sqrt(np.einsum("ij,ij->j", fields, mass @ fields))
-    rest = orthogonal(fields[:, norms > 0.0] / norms[norms > 0.0], mass, known)
-    values, turns = np.linalg.eigh(rest.T @ (mass @ rest))
-    own = values > _OWN_SHARE
-    return np.asarray(rest @ (turns[:, own] / np.sqrt(values[own])))
+    residual = orthogonal(fields[:, norms > 0.0] / norms[norms > 0.0], mass, known)
+    values, vectors = np.linalg.eigh(residual.T @ (mass @ residual))
+    independent = values > _OWN_SHARE
+    return np.asarray(residual @ (vectors[:, independent] / np.sqrt(values[independent])))
 
 
 def krylov(
@@ -59,7 +59,7 @@ def krylov(
 
     start   (n, m) fields that span the first block
     solve   K^-1 applied to loads (n, m)
-    select  the part of a block to keep, from the block and those before; left out: all of it
+    select  returns the part of a block to keep, from the block and the earlier blocks; default: all of it
 
     Each block is the static response to the inertia of the one before: it says how the structure lags behind that, to
     the next order in omega^2 (Craig and Hale 1988, J. Guidance 11(6), block-Krylov component synthesis). It has no
@@ -79,8 +79,8 @@ def krylov(
 
 def ritz_values(stiffness: Any, mass: Any, fields: np.ndarray) -> np.ndarray:
     """Return the Ritz values of K x = lambda M x in the span of fields (n, m), ascending, one per dimension of it."""
-    left, singular, _ = np.linalg.svd(fields, full_matrices=False)
-    basis = orthonormal(left[:, singular > 1e-8 * singular[0]], mass)
+    span, singular, _ = np.linalg.svd(fields, full_matrices=False)
+    basis = orthonormal(span[:, singular > 1e-8 * singular[0]], mass)
     return np.linalg.eigvalsh(symmetric_part(basis.T @ (stiffness @ basis)))
 
 
@@ -130,7 +130,7 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
 
 
-def turns(axis: np.ndarray, sectors: int) -> np.ndarray:
+def sector_rotations(axis: np.ndarray, sectors: int) -> np.ndarray:
     """Return the rotations (N, 3, 3) of the frames of N sectors about an axis (3,)."""
     return np.array([rotation(axis, 2.0 * np.pi * sector / sectors) for sector in range(sectors)])
 
@@ -144,6 +144,6 @@ def speed_weights(speed: float, greatest: float, count: int) -> np.ndarray:
 
 
 def added_by_speed(speed: float, greatest: float, matrices: Sequence[Any]) -> Any:
-    """Return what a speed adds to a stiffness: the sum of matrices by their `speed_weights`."""
+    """Return the stiffness added at a speed: the sum of matrices, weighted by `speed_weights`."""
     weights = speed_weights(speed, greatest, len(matrices))
     return sum(weight * matrix for weight, matrix in zip(weights, matrices, strict=True))

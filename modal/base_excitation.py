@@ -56,18 +56,18 @@ def base_response(
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
     if not np.all(np.isfinite(omega)) or omega.min() < 0.0:
         raise BaseExcitationError("frequencies_hz: expected finite numbers of Hz, not negative")
-    own = modes.angular_frequencies
-    if own.min() <= 1e-6 * own.max():
+    natural = modes.angular_frequencies
+    if natural.min() <= 1e-6 * natural.max():
         raise BaseExcitationError("modes: the structure has rigid motions; hold it at the base")
-    ratios = np.broadcast_to(matrices.damping_ratio if damping_ratios is None else damping_ratios, own.shape)
+    ratios = np.broadcast_to(matrices.damping_ratio if damping_ratios is None else damping_ratios, natural.shape)
     translation = matrices.rigid_translations() @ unit_direction(direction)
     load = matrices.mass @ translation  # the whole base moves, so nodes that it holds push their neighbours
     factors = modes.shapes @ load
-    resonances = own[:, None] ** 2 - omega**2 + 2j * ratios[:, None] * own[:, None] * omega
+    resonances = natural[:, None] ** 2 - omega**2 + 2j * ratios[:, None] * natural[:, None] * omega
     seen = modes.shapes @ observed
     relative = -np.einsum("mk,m,mn->kn", seen, factors, 1.0 / resonances)
     if static_correction:
-        residual = observed.T @ static_shape(matrices, load) - (factors / own**2) @ seen
+        residual = observed.T @ static_shape(matrices, load) - (factors / natural**2) @ seen
         relative = relative - residual[:, None]
     rigid = observed.T @ translation
     absolute = rigid[:, None] - omega**2 * relative

@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.kept_solutions import Keep, not_kept
 from vanedamp.modal.mode_tracking import Tracks
-from vanedamp.modal.records.campbell import RPM, Campbell, Crossing
+from vanedamp.modal.records.campbell import RPM, Campbell, OrderCrossing
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.speed_range import SpeedRange
 
@@ -61,9 +61,9 @@ def campbell(
             approaches = tracks.approaches()
             crossings = _crossings(source, tracks, orders)
             met = [approach.speed for approach in approaches] + [crossing.speed for crossing in crossings]
-            places = np.unique(np.concatenate([tracks.speeds, met]))
-            errors = np.array([source.errors(float(speed)).max() for speed in places])
-            worst = float(places[np.argmax(errors)])
+            estimated = np.unique(np.concatenate([tracks.speeds, met]))
+            errors = np.array([source.errors(float(speed)).max() for speed in estimated])
+            worst = float(estimated[np.argmax(errors)])
             if errors.max() <= tolerance or worst in source.solved:
                 break
             source.add(worst)
@@ -74,18 +74,18 @@ def campbell(
         warnings += neglected_notes(neglected)
         frequencies = np.array([tracks.frequencies(mode) for mode in tracks.kept]) / (2.0 * np.pi)
         for mode, curve in zip(tracks.kept, frequencies, strict=True):
-            known = tracks.speeds[np.isfinite(curve)]
-            if known.size < curve.size:
+            computed = tracks.speeds[np.isfinite(curve)]
+            if computed.size < curve.size:
                 warnings.append(
-                    f"mode {mode + 1} is among the modes computed only from {known[0] * RPM:.6g} to "
-                    f"{known[-1] * RPM:.6g} rpm; ask for more modes to see the rest of it"
+                    f"mode {mode + 1} is among the modes computed only from {computed[0] * RPM:.6g} to "
+                    f"{computed[-1] * RPM:.6g} rpm; ask for more modes to see the rest of it"
                 )
         return Campbell(
             speeds=tracks.speeds,
             asked=np.isin(tracks.speeds, wanted),
             modes=tracks.kept,
             frequencies_hz=frequencies,
-            errors=errors[np.isin(places, tracks.speeds)],
+            errors=errors[np.isin(estimated, tracks.speeds)],
             solved=np.sort(source.solved),
             orders=tuple(float(order) for order in orders),
             crossings=tuple(crossings),
@@ -98,7 +98,7 @@ def campbell(
 
 
 def neglected_notes(error: float) -> list[str]:
-    """Return the warning of a relative error of frequencies for what the stiffness neglects between its speeds."""
+    """Return the warning of a relative error of frequencies, due to interpolating the stiffness between speeds."""
     if error <= _NOTABLE:
         return []
     return [
@@ -107,17 +107,17 @@ def neglected_notes(error: float) -> list[str]:
     ]
 
 
-def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[Crossing]:
+def _crossings(source: SpeedRange, tracks: Tracks, orders: Sequence[float]) -> list[OrderCrossing]:
     """Return the crossings of the modes that are kept with engine orders, by their speed."""
     low, high = tracks.speeds[[0, -1]]
-    found = [
-        Crossing(tracks.number_at(speed, place), float(order), speed, order * speed / (2.0 * np.pi))
+    crossings = [
+        OrderCrossing(tracks.number_at(speed, mode), float(order), speed, order * speed / (2.0 * np.pi))
         for order in orders
-        for place, speed in source.meetings(order)
-        if place < source.count and low <= speed <= high
+        for mode, speed in source.meetings(order)
+        if mode < source.count and low <= speed <= high
     ]
-    kept = [crossing for crossing in found if crossing.mode in tracks.kept]
-    return sorted(kept, key=lambda crossing: (crossing.speed, crossing.mode))
+    followed = [crossing for crossing in crossings if crossing.mode in tracks.kept]
+    return sorted(followed, key=lambda crossing: (crossing.speed, crossing.mode))
 
 
 def checked_speeds(

@@ -22,7 +22,7 @@ from vanedamp.modal.records.modes import Modes
 LEAST_MAC = 0.5
 # an affine field has four coefficients; twice as many nodes keep its fit well-posed in all but flat patches
 _NEIGHBOURS = 8
-# of a shape's largest displacement
+# fraction of a shape's largest displacement
 _UNSEEN = 1e-6
 
 
@@ -49,17 +49,15 @@ class MeasuredShapes:
 
     def __post_init__(self) -> None:
         shapes = np.atleast_2d(np.asarray(self.shapes))
-        count, places = shapes.shape
+        count, size = shapes.shape
         values = {
             "points": frozen(np.reshape(self.points, (-1, 3))),
             "directions": frozen(np.reshape(self.directions, (-1, 3))),
             "shapes": frozen(shapes, complex if np.iscomplexobj(shapes) else float),
         }
         for name in ("points", "directions"):
-            if values[name].shape != (places, 3) or not np.all(np.isfinite(values[name])):
-                raise CorrelationError(
-                    f"{name}: expected {places} rows of three numbers, one for every value of a shape"
-                )
+            if values[name].shape != (size, 3) or not np.all(np.isfinite(values[name])):
+                raise CorrelationError(f"{name}: expected {size} rows of three numbers, one for every value of a shape")
         lengths = np.linalg.norm(values["directions"], axis=1)
         if not np.all(lengths > 0.0):
             raise CorrelationError(f"directions: row {int(np.argmin(lengths))} has no length")
@@ -67,10 +65,10 @@ class MeasuredShapes:
             raise CorrelationError("shapes: every shape needs finite values that are not all zero")
         values["directions"] = frozen(values["directions"] / lengths[:, None])
         for name in ("frequencies_hz", "damping_ratios"):
-            given = np.asarray(getattr(self, name), dtype=float)
-            if given.size not in (0, count):
-                raise CorrelationError(f"{name}: {given.size} values for {count} shapes")
-            values[name] = frozen(given if given.size else np.full(count, np.nan))
+            per_shape = np.asarray(getattr(self, name), dtype=float)
+            if per_shape.size not in (0, count):
+                raise CorrelationError(f"{name}: {per_shape.size} values for {count} shapes")
+            values[name] = frozen(per_shape if per_shape.size else np.full(count, np.nan))
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -119,8 +117,8 @@ def pair_modes(mac: np.ndarray, least: float = LEAST_MAC) -> Pairing:
         raise CorrelationError(f"mac: expected a finite matrix (m1, m2), not shape {values.shape}")
     # values below the threshold count as zero, so that they displace no pair above it
     first, second = linear_sum_assignment(-np.where(values >= least, values, 0.0))
-    kept = values[first, second] >= least
-    return Pairing(frozen(values), frozen(first[kept], np.int64), frozen(second[kept], np.int64))
+    is_pair = values[first, second] >= least
+    return Pairing(frozen(values), frozen(first[is_pair], np.int64), frozen(second[is_pair], np.int64))
 
 
 def interpolation(coordinates: np.ndarray, points: np.ndarray, directions: np.ndarray) -> sparse.csr_array:
@@ -151,7 +149,7 @@ def observed_shapes(modes: Modes, matrices: SystemMatrices, measured: MeasuredSh
 def measured_mac(modes: Modes, matrices: SystemMatrices, measured: MeasuredShapes) -> np.ndarray:
     """Return the MAC (computed, measured) at the measured degrees of freedom."""
     seen = observed_shapes(modes, matrices, measured)
-    # a mode that does not move what was measured is round-off there, and round-off has the shape of anything
+    # a mode without motion at the sensors is round-off there, which may resemble any shape
     unseen = np.abs(seen).max(axis=1) < _UNSEEN * np.abs(modes.shapes).max(axis=1)
     seen[unseen] = 0.0
     return modal_assurance(seen, measured.shapes)

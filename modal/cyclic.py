@@ -35,14 +35,14 @@ def aliased(order: int, sectors: int) -> tuple[int, int]:
     """
     if order != int(order) or order < 0:
         raise CyclicError(f"order: expected a whole number of at least 0, not {order}")
-    rest = int(order) % sectors
-    if rest == 0 or 2 * rest == sectors:
-        return rest, 0
-    return (rest, 1) if 2 * rest < sectors else (sectors - rest, -1)
+    remainder = int(order) % sectors
+    if remainder == 0 or 2 * remainder == sectors:
+        return remainder, 0
+    return (remainder, 1) if 2 * remainder < sectors else (sectors - remainder, -1)
 
 
 @dataclass(frozen=True)
-class Spring:
+class SectorSpring:
     """Springs from every sector to the next, between the mean displacements of two patches.
 
     low, high  patches: `high` of a sector and `low` of the next one
@@ -115,7 +115,7 @@ class CyclicSector:
     low: np.ndarray
     high: np.ndarray
     distance: float = 0.0
-    couplings: tuple[Spring, ...] = ()
+    couplings: tuple[SectorSpring, ...] = ()
 
     @property
     def angle(self) -> float:
@@ -135,21 +135,23 @@ class CyclicSector:
         """Return the problem of a nodal diameter. Raises CyclicError for one that the ring does not have."""
         if diameter not in self.diameters:
             raise CyclicError(f"diameter: expected 0 to {self.sectors // 2} of {self.sectors} sectors, not {diameter}")
-        given, travels = self.matrices, self.travels(diameter)
-        expansion, kept, fixed = self._expansion(diameter, travels)
+        sector, travels = self.matrices, self.travels(diameter)
+        expansion, nodes, fixed = self._expansion(diameter, travels)
         copies = 2 if travels else 1
-        if self._parts is None:
-            stiffness, mass = (_real_form(expansion, one, travels) for one in (self.stiffness(diameter), given.mass))
+        if self._terms is None:
+            stiffness, mass = (
+                _real_form(expansion, matrix, travels) for matrix in (self.stiffness(diameter), sector.mass)
+            )
         else:
-            stiffness, mass = (part.real_form(diameter * self.angle, travels) for part in self._parts)
+            stiffness, mass = (terms.real_form(diameter * self.angle, travels) for terms in self._terms)
         matrices = SystemMatrices(
             stiffness=stiffness,
             mass=mass,
-            coordinates=np.tile(given.coordinates[kept], (copies, 1)),
-            fixed=np.concatenate([fixed + copy * 3 * kept.size for copy in range(copies)]),
+            coordinates=np.tile(sector.coordinates[nodes], (copies, 1)),
+            fixed=np.concatenate([fixed + copy * 3 * nodes.size for copy in range(copies)]),
             patches={},
-            damping_ratio=given.damping_ratio,
-            provenance=dict(given.provenance) | {"sectors": self.sectors, "diameter": diameter},
+            damping_ratio=sector.damping_ratio,
+            provenance=dict(sector.provenance) | {"sectors": self.sectors, "diameter": diameter},
         )
         return Diameter(diameter, matrices, expansion)
 
@@ -158,18 +160,18 @@ class CyclicSector:
 
         The stretch is high q_j - low q_(j+1), in the axes of sector j.
         """
-        given, turn = self.matrices, self.turn()
+        matrices, rotation = self.matrices, self.turn()
         return [
             (
-                np.array([patch_average(given, spring.high, axis) for axis in np.eye(3)]),
-                turn @ np.array([patch_average(given, spring.low, axis) for axis in np.eye(3)]),
+                np.array([patch_average(matrices, spring.high, axis) for axis in np.eye(3)]),
+                rotation @ np.array([patch_average(matrices, spring.low, axis) for axis in np.eye(3)]),
                 np.array(spring.stiffness),
             )
             for spring in self.couplings
         ]
 
     def travels(self, diameter: int) -> bool:
-        """Say whether a nodal diameter has waves of two senses: 0 < h < N / 2."""
+        """Whether a nodal diameter has waves of two senses: 0 < h < N / 2."""
         return 0 < 2 * diameter < self.sectors
 
     def stiffness(self, diameter: int) -> sparse.csr_array:
@@ -181,15 +183,15 @@ class CyclicSector:
         return sparse.csr_array(total)
 
     @cached_property
-    def _parts(self) -> tuple[_Parts, _Parts] | None:
+    def _terms(self) -> tuple[_Terms, _Terms] | None:
         """Stiffness and mass by their dependence on the diameter; None with springs or nodes on the axis."""
         if self.couplings or np.any(self.low == self.high):
             return None
         expansion = self._expansion(0, False)[0].real
         beyond = sparse.diags(np.repeat(np.isin(np.arange(len(self.matrices.coordinates)), self.high), 3) * 1.0)
         turned = sparse.csr_array(beyond @ expansion)
-        own = sparse.csr_array(expansion - turned)
-        return _Parts.of(self.matrices.stiffness, own, turned), _Parts.of(self.matrices.mass, own, turned)
+        unturned = sparse.csr_array(expansion - turned)
+        return _Terms.of(self.matrices.stiffness, unturned, turned), _Terms.of(self.matrices.mass, unturned, turned)
 
     def _expansion(self, diameter: int, travels: bool) -> tuple[sparse.csr_array, np.ndarray, np.ndarray]:
         """Return T_h (N, 3 m), the kept nodes (m,), and the fixed ones (f,) of its freedoms."""
@@ -197,44 +199,44 @@ class CyclicSector:
         central = self.low[self.low == self.high]
         off = self.low != self.high
         low, high = self.low[off], self.high[off]
-        kept = np.setdiff1d(np.arange(count), high)
-        place = np.full(count, -1)
-        place[kept] = np.arange(kept.size)
-        own = np.setdiff1d(kept, central)
-        blocks = [(own, own, np.eye(3)), (high, low, phase * self.turn())]
-        fixed = np.isin(3 * kept[:, None] + np.arange(3), self.matrices.fixed)
+        nodes = np.setdiff1d(np.arange(count), high)
+        index = np.full(count, -1)
+        index[nodes] = np.arange(nodes.size)
+        plain = np.setdiff1d(nodes, central)
+        blocks = [(plain, plain, np.eye(3)), (high, low, phase * self.turn())]
+        fixed = np.isin(3 * nodes[:, None] + np.arange(3), self.matrices.fixed)
         for node in central:
-            directions = self._on_axis(np.flatnonzero(fixed[place[node]]), phase, travels)
+            directions = self._on_axis(np.flatnonzero(fixed[index[node]]), phase, travels)
             blocks.append((np.array([node]), np.array([node]), directions))
-            fixed[place[node]] = ~np.any(directions, axis=0)
+            fixed[index[node]] = ~np.any(directions, axis=0)
         rows = [3 * node[:, None, None] + np.arange(3)[:, None] + np.zeros((1, 3), int) for node, _, _ in blocks]
-        columns = [3 * place[of][:, None, None] + np.zeros((3, 1), int) + np.arange(3) for _, of, _ in blocks]
+        columns = [3 * index[of][:, None, None] + np.zeros((3, 1), int) + np.arange(3) for _, of, _ in blocks]
         values = [np.broadcast_to(block, (node.size, 3, 3)) for node, _, block in blocks]
-        joined = (np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns))
+        joined = (np.concatenate([array.ravel() for array in arrays]) for arrays in (values, rows, columns))
         data, row, column = joined
-        expansion = sparse.csr_array((data, (row, column)), shape=(3 * count, 3 * kept.size), dtype=complex)
+        expansion = sparse.csr_array((data, (row, column)), shape=(3 * count, 3 * nodes.size), dtype=complex)
         expansion.eliminate_zeros()
-        return expansion, kept, np.flatnonzero(fixed)
+        return expansion, nodes, np.flatnonzero(fixed)
 
-    def _on_axis(self, held: np.ndarray, phase: complex, travels: bool) -> np.ndarray:
+    def _on_axis(self, fixed: np.ndarray, phase: complex, travels: bool) -> np.ndarray:
         """Return the motions (3, 3) of a node on the axis, u = exp(i h alpha) R u, as columns, zeros after the last."""
-        bound = np.vstack([phase * self.turn() - np.eye(3), np.eye(3)[held]])
+        bound = np.vstack([phase * self.turn() - np.eye(3), np.eye(3)[fixed]])
         free = linalg.null_space(bound if travels else bound.real, rcond=_NULL)
         return np.pad(free, ((0, 0), (0, 3 - free.shape[1])))
 
 
-class _Parts(NamedTuple):
+class _Terms(NamedTuple):
     """A symmetric matrix in the freedoms of all diameters, on one pattern: even.real + even.imag cos + i odd sin."""
 
     even: sparse.csr_array
     odd: sparse.csr_array
 
     @classmethod
-    def of(cls, matrix: sparse.csr_array, own: sparse.csr_array, turned: sparse.csr_array) -> _Parts:
-        """Return the parts for T_h = own + exp(i h alpha) turned."""
+    def of(cls, matrix: sparse.csr_array, unturned: sparse.csr_array, turned: sparse.csr_array) -> _Terms:
+        """Return the parts for T_h = unturned + exp(i h alpha) turned."""
         forces = matrix @ turned
-        alone, across = own.T @ (matrix @ own) + turned.T @ forces, sparse.csr_array(own.T @ forces)
-        return cls(*(sparse.csr_array(part) for part in (alone + 1j * (across + across.T), across - across.T)))
+        diagonal, across = unturned.T @ (matrix @ unturned) + turned.T @ forces, sparse.csr_array(unturned.T @ forces)
+        return cls(*(sparse.csr_array(term) for term in (diagonal + 1j * (across + across.T), across - across.T)))
 
     def real_form(self, angle: float, travels: bool) -> sparse.csr_array:
         """Return the real form at h alpha (rad); zeros stay, so that all diameters have one pattern."""
@@ -264,7 +266,7 @@ def cyclic_sector(
     sectors: int,
     axis: Sequence[float] | np.ndarray = (0.0, 0.0, 1.0),
     point: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
-    couplings: Sequence[Spring] = (),
+    couplings: Sequence[SectorSpring] = (),
     tolerance: float = TOLERANCE,
 ) -> CyclicSector:
     """Return the sector of a ring, the nodes of its faces in pairs.

@@ -16,7 +16,7 @@ from vanedamp.modal.campbell import CampbellError, checked_speeds, neglected_not
 from vanedamp.modal.cyclic import CyclicSector, aliased
 from vanedamp.modal.cyclic_rotation import rotating_diameter
 from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
-from vanedamp.modal.records.campbell import Campbell, Crossing
+from vanedamp.modal.records.campbell import Campbell, OrderCrossing
 from vanedamp.modal.rotating import RotatingMatrices
 from vanedamp.modal.speed_range import SmallMatrices, SpeedRange, meetings, ritz_modes
 
@@ -42,8 +42,8 @@ def ring_campbell(
     wanted = checked_speeds(speeds, orders, count, rotating.standing.free.size, tolerance)
     if any(order != int(order) for order in orders):
         raise CampbellError("orders: expected whole engine orders of a ring")
-    curves: list[_Curve] = []
-    crossings: list[Crossing] = []
+    curves: list[_DiameterCurve] = []
+    crossings: list[OrderCrossing] = []
     errors, solved, neglected = [], set(), 0.0
     for diameter in sector.diameters:
         if report is not None:
@@ -53,14 +53,14 @@ def ring_campbell(
         asked = min((2 if travels else 1) * count, turning.standing.free.size)
         alike = [(float(order), aliased(int(order), sector.sectors)) for order in orders]
         exciting = [(order, sense) for order, (excited, sense) in alike if excited == diameter]
-        made = _Waves if travels else SpeedRange
-        with made(turning, float(wanted[0]), float(wanted[-1]), asked, gyroscopic, keep) as source:
+        source_class = _Waves if travels else SpeedRange
+        with source_class(turning, float(wanted[0]), float(wanted[-1]), asked, gyroscopic, keep) as source:
             for sense, frequencies, met in _waves(source, exciting, wanted, count, tolerance):
                 crossings += [
-                    Crossing(len(curves) + family, order, speed, order * speed / (2.0 * np.pi))
+                    OrderCrossing(len(curves) + family, order, speed, order * speed / (2.0 * np.pi))
                     for order, family, speed in met
                 ]
-                curves += [_Curve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
+                curves += [_DiameterCurve(sense * diameter, family, curve) for family, curve in enumerate(frequencies)]
             errors.append(_errors(source, wanted))
             neglected = max(neglected, source.neglected_error())
             solved |= set(source.solved)
@@ -86,7 +86,7 @@ def ring_campbell(
     )
 
 
-class _Curve(NamedTuple):
+class _DiameterCurve(NamedTuple):
     diameter: int
     family: int
     frequencies: np.ndarray
@@ -108,11 +108,11 @@ def _waves(
     exciting: orders that excite the diameter, each with its sense.
     """
     senses = (1, -1) if isinstance(source, _Waves) and source.gyroscopic else (1,)
-    places = speeds
+    refined = speeds
     for _ in range(2):  # then with the speeds of the crossings, to which the first ones are near enough
-        _refine(source, places, tolerance)
+        _refine(source, refined, tolerance)
         waves = [_of_sense(source, sense, exciting, speeds, count, len(senses) > 1) for sense in senses]
-        places = np.union1d(speeds, [speed for wave in waves for _, _, speed in wave.met])
+        refined = np.union1d(speeds, [speed for wave in waves for _, _, speed in wave.met])
     return waves
 
 
@@ -123,15 +123,15 @@ def _of_sense(
     small = source.of_sense(sense) if isinstance(source, _Waves) else source.small
     frequencies = np.array([ritz_modes(small, float(speed))[0][:count] for speed in speeds]).T
     # of the waves of one sense, some may lie above all that the basis is for
-    known = np.array([source.modes(float(speed)).frequencies[-1] for speed in speeds]) * (1.0 + 1e-9)
+    highest = np.array([source.modes(float(speed)).frequencies[-1] for speed in speeds]) * (1.0 + 1e-9)
     met = [
         (order, family, speed)
-        for order, own in exciting
-        if own == sense or not split
+        for order, excited in exciting
+        if excited == sense or not split
         for family, speed in meetings(small, order)
         if family < count and speeds[0] <= speed <= speeds[-1]
     ]
-    return _Wave(sense, np.where(frequencies <= known, frequencies, np.nan), met)
+    return _Wave(sense, np.where(frequencies <= highest, frequencies, np.nan), met)
 
 
 def _errors(source: SpeedRange, speeds: np.ndarray) -> np.ndarray:
@@ -149,10 +149,10 @@ def _refine(source: SpeedRange, speeds: np.ndarray, tolerance: float) -> None:
 
 
 class _Waves(SpeedRange):
-    """A basis for the real form of a diameter, with i times every field, so that its two waves can be told apart."""
+    """A basis for the real form of a diameter, with i times every field, to separate its two waves."""
 
     def of_sense(self, sense: int) -> SmallMatrices:
-        """Return the small matrices of the waves exp(i (omega t + h j alpha)), omega > 0, or of those with -h."""
+        """Return the small matrices of the waves exp(i (omega t + h j alpha)), omega > 0, or of the waves with -h."""
         basis = self.basis
         turned = basis.T @ (self.rotating.standing.of_free(self.rotating.standing.mass) @ _turned(basis.T).T)
         values, vectors = np.linalg.eigh(-1j * sense * turned)

@@ -13,7 +13,7 @@ from vanedamp.modal.matrices import SystemMatrices
 
 #: distance of two nodes that are one, over the size of the sector
 TOLERANCE = 1e-6
-# of the size: centres of faces about the right axis are nearer to each other, however the faces are meshed
+# fraction of the size: with the correct axis, centres of the faces are closer than this, however they are meshed
 _SAME_CENTRE = 1e-2
 # degrees between angles that differ
 _ANGLE = 1e-3
@@ -34,23 +34,23 @@ def paired(
     """
     first, second = matrices.patch(low), matrices.patch(high)
     size = float(np.ptp(matrices.coordinates, axis=0).max())
-    turn = rotation(axis, 2.0 * math.pi / sectors)
-    places, ends = ((matrices.coordinates - point)[patch.nodes] for patch in (first, second))
-    distances, order = cKDTree(places @ turn.T).query(ends)
+    rotated = rotation(axis, 2.0 * math.pi / sectors)
+    starts, ends = ((matrices.coordinates - point)[patch.nodes] for patch in (first, second))
+    distances, order = cKDTree(starts @ rotated.T).query(ends)
     worst = int(np.argmax(distances))
     fits = distances[worst] <= tolerance * size
-    if not fits or len(order) != len(places) or np.unique(order).size != len(order):
-        low_centre, high_centre = (patch.weights @ at / patch.area for patch, at in ((first, places), (second, ends)))
+    if not fits or len(order) != len(starts) or np.unique(order).size != len(order):
+        low_centre, high_centre = (patch.weights @ at / patch.area for patch, at in ((first, starts), (second, ends)))
         check_angle(low_centre, high_centre, sectors, axis, size)
-        if len(places) != len(ends):
-            raise CyclicError(f"ring.low: {low!r} has {len(places)} nodes, {high!r} {len(ends)}; mesh both faces alike")
+        if len(starts) != len(ends):
+            raise CyclicError(f"ring.low: {low!r} has {len(starts)} nodes, {high!r} {len(ends)}; mesh both faces alike")
         x, y, z = matrices.coordinates[second.nodes[worst]]
         raise CyclicError(
             f"ring.high: faces part at ({x:.6g}, {y:.6g}, {z:.6g}) by {distances[worst]:.3g} m, with up to "
             f"{tolerance * size:.3g} m allowed; mesh both alike, or give a larger tolerance"
         )
     nodes = first.nodes[order]
-    _check_supports(matrices, nodes, second.nodes, turn)
+    _check_supports(matrices, nodes, second.nodes, rotated)
     return nodes, second.nodes, float(distances[worst])
 
 
@@ -62,9 +62,9 @@ def check_sides(
         patch.weights @ (matrices.coordinates[patch.nodes] - point) / patch.area
         for patch in (matrices.patch(low), matrices.patch(high))
     )
-    turn = rotation(axis, 2.0 * math.pi / sectors)
-    next_one, other = (float(np.linalg.norm(second - place)) for place in (turn @ first, turn.T @ first))
-    if next_one > (1.0 + _ANGLE) * other:
+    rotated = rotation(axis, 2.0 * math.pi / sectors)
+    next_one, before = (float(np.linalg.norm(second - centre)) for centre in (rotated @ first, rotated.T @ first))
+    if next_one > (1.0 + _ANGLE) * before:
         raise CyclicError(
             "ring.spring.low: low and high are swapped: a positive turn about the axis leads to the next sector, but "
             f"{high!r} is nearer to {low!r} of the one before"
@@ -72,7 +72,7 @@ def check_sides(
 
 
 def check_angle(first: np.ndarray, second: np.ndarray, sectors: int, axis: np.ndarray, size: float) -> None:
-    """Raise CyclicError where the centres (3,) of both faces say that axis or number of sectors is wrong.
+    """Raise CyclicError if, by the centres (3,) of both faces, the axis or the number of sectors is wrong.
 
     Centres from a point of the axis, a unit vector; size: of the sector; all in one unit of length.
     """
@@ -99,7 +99,7 @@ def check_angle(first: np.ndarray, second: np.ndarray, sectors: int, axis: np.nd
 
 
 def _check_supports(matrices: SystemMatrices, low: np.ndarray, high: np.ndarray, turn: np.ndarray) -> None:
-    """Raise CyclicError for paired nodes of which one is held where the other one is free."""
+    """Raise CyclicError for paired nodes with different supports."""
     held = np.zeros(matrices.size, dtype=bool)
     held[matrices.fixed] = True
     held = held.reshape(-1, 3)

@@ -17,7 +17,7 @@ from vanedamp.modal.petsc import one_analysis
 from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.records.ring_modes import RingModes
 
-# of the squared length of a field: less is round-off of fields that the others determine
+# fraction of a field's squared length: smaller ones are round-off of dependent fields
 _DEPENDENT = 1e-12
 
 
@@ -47,7 +47,7 @@ def ring_modes(
     Raises CyclicError for a diameter that the ring does not have, and SolverError.
     """
     wanted = list(sector.diameters if diameters is None else diameters)
-    found: list[Family] = []
+    families: list[Family] = []
     # two factors are kept: where the memory may not hold them, each diameter is analysed by itself
     roomy = chosen("auto", 2 * 2 * sector.matrices.size)["name"] == "factor"
     with one_analysis() if roomy else contextlib.nullcontext():
@@ -60,16 +60,16 @@ def ring_modes(
                 modes = solve_modes(problem.matrices, most, max_frequency, solver=solver)
             except NoModesError:
                 continue
-            found.append(_of_diameter(sector, problem, modes))
+            families.append(_of_diameter(sector, problem, modes))
             provenance = modes.provenance
-    if not found:
+    if not families:
         raise NoModesError(f"max_frequency: the ring has no mode up to {max_frequency} Hz; raise it")
-    return gathered(sector, found, dict(sector.matrices.provenance) | {"solver": provenance["solver"]})
+    return gathered(sector, families, dict(sector.matrices.provenance) | {"solver": provenance["solver"]})
 
 
-def gathered(sector: CyclicSector, found: Sequence[Family], provenance: Mapping[str, Any]) -> RingModes:
+def gathered(sector: CyclicSector, families: Sequence[Family], provenance: Mapping[str, Any]) -> RingModes:
     """Return the record of modes by diameter."""
-    numbers, frequencies, residuals, shapes = zip(*found, strict=True)
+    numbers, frequencies, residuals, shapes = zip(*families, strict=True)
     counts = [len(values) for values in frequencies]
     return RingModes(
         sector.sectors,
@@ -100,9 +100,9 @@ def _of_diameter(sector: CyclicSector, problem: Diameter, modes: Modes) -> Famil
 def independent(fields: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
     """Return mass-orthonormal combinations (r, n) of complex fields (k, n), r of which are independent."""
     for _ in range(2):  # once more, as the smallest have few digits at first
-        values, turns = linalg.eigh(fields.conj() @ (mass @ fields.T))
-        own = values > _DEPENDENT * values[-1]
-        fields = (turns[:, own] / np.sqrt(values[own])).T @ fields
+        values, vectors = linalg.eigh(fields.conj() @ (mass @ fields.T))
+        retained = values > _DEPENDENT * values[-1]
+        fields = (vectors[:, retained] / np.sqrt(values[retained])).T @ fields
     return fields
 
 

@@ -50,23 +50,23 @@ def gyroscopic_ring_modes(
 
     sector    for the ring's geometry; diameters and report: as in `ring_modes`
 
-    Raises what `ring_modes` and modal.gyroscopic.gyroscopic_modes raise.
+    Raises the errors of `ring_modes` and modal.gyroscopic.gyroscopic_modes.
     """
     stiffness = rotating.standing.stiffness + rotating.added(speed)
     here = replace(sector, matrices=replace(rotating.standing, stiffness=stiffness))
     wanted = list(sector.diameters if diameters is None else diameters)
-    found: list[Family] = []
+    families: list[Family] = []
     for done, number in enumerate(wanted):
         if report is not None:
             report(done, len(wanted))
         problem, turning = here.at(number), rotating_diameter(sector, rotating, number)
         if problem.travels:
-            found += _waves(here, problem, turning, rotating, speed, count)
+            families += _waves(here, problem, turning, rotating, speed, count)
             continue
         modes = gyroscopic_modes(turning, speed, min(count, problem.matrices.free.size))
         shapes = scaled(here, problem.fields(modes.shapes), False)
-        found.append(Family(number, modes.frequencies_hz, modes.residuals, shapes))
-    return gathered(here, found, dict(here.matrices.provenance) | {"speed": speed})
+        families.append(Family(number, modes.frequencies_hz, modes.residuals, shapes))
+    return gathered(here, families, dict(here.matrices.provenance) | {"speed": speed})
 
 
 def _waves(
@@ -88,7 +88,7 @@ def _waves(
         )
         waves = [(problem.number, basis, *dense_modes(stiffness, coupling)),
                  (-problem.number, basis.conj(), *dense_modes(stiffness.conj(), coupling.conj()))]  # fmt: skip
-        # the lowest in size of both are those of the real form; beyond them the basis knows none
+        # the lowest of both in size are the modes of the real form; the basis has no others
         last = modes.frequencies_hz[-1] * 2.0 * np.pi * (1.0 + 1e-9)
         fewest = min(int(np.count_nonzero(omega <= last)) for _, _, omega, _ in waves)
         if fewest >= count or asked == most:

@@ -16,7 +16,7 @@ from vanedamp.modal.statics import Statics
 
 
 class RingStatics(Statics):
-    """Those of a ring whose sectors are all loaded alike.
+    """Static solutions of a ring with the same load on all sectors.
 
     sector_of  returns the sector of the ring from its matrices
     """

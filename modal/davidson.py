@@ -21,11 +21,11 @@ _ROUNDS = 300
 _AT_ONCE = 4
 # round-off of an entry of a residual, relative to the product on the diagonal
 _ROUND_OFF = 64.0 * np.finfo(float).eps
-# rounds in which an estimate has not halved; then it has converged if it is within so many times its round-off
+# rounds without halving of an estimate, after which it has converged within this multiple of its round-off
 _STALE, _NEAR = 10, 1e4
-# relative change of an eigenvalue after which a converged pair is another one
+# relative change of an eigenvalue above which a converged pair is a different one
 _SAME = 1e-10
-# directions shorter than this, relative, are round-off
+# relative length below which directions are round-off
 _DEPENDENT = 1e-12
 
 
@@ -55,14 +55,14 @@ def lowest_eigenpairs(
     settled, before = np.full(wanted, np.nan), np.empty((0, wanted))
     least, stale = np.full(wanted, np.inf), np.zeros(wanted, int)
     for _ in range(_ROUNDS):
-        values, turns = space.ritz()
+        values, vectors = space.ritz()
         heights = values[:wanted] - floor
         open_ = np.flatnonzero(~(np.abs(values[:wanted] - settled) <= np.maximum(limits**2, _SAME) * heights))
         if not open_.size:
-            return values[:wanted], turns[:, :wanted].T @ space.vectors[: space.count]
+            return values[:wanted], vectors[:, :wanted].T @ space.vectors[: space.count]
         if space.count + open_.size > space.most:
-            turns = space.restart(turns[:, :wanted], before)
-        before = turns[:, :wanted]
+            vectors = space.restart(vectors[:, :wanted], before)
+        before = vectors[:, :wanted]
         for some in np.array_split(open_, -(-open_.size // _AT_ONCE)):
             rows = before[:, some].T @ space.vectors[: len(before)]
             residuals = stiffness(rows) - values[some, None] * mass(rows)
@@ -100,18 +100,20 @@ class _Ritz(Subspace):
 
     def ritz(self) -> tuple[np.ndarray, np.ndarray]:
         """Return all Ritz values (k,), ascending, and their vectors (k, k) in the rows."""
-        values, turns = np.linalg.eigh(self.projected[: self.count, : self.count])
-        return values, turns
+        values, vectors = np.linalg.eigh(self.projected[: self.count, : self.count])
+        return values, vectors
 
-    def restart(self, turns: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Keep Ritz vectors (k, m) and those of the last round (j <= k, m) only; return the former in the rows."""
-        kept, known = turns, np.zeros_like(turns)
-        known[: len(before)] = before[:, : turns.shape[1]]
+    def restart(self, vectors: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Keep only Ritz vectors (k, m) and those of the last round (j <= k, m); return the former in the new rows."""
+        basis, earlier = vectors, np.zeros_like(vectors)
+        earlier[: len(before)] = before[:, : vectors.shape[1]]
         for _ in range(2):  # the two are nearly the same
-            known = known - kept @ (kept.T @ known)
-            known, triangle = np.linalg.qr(known)
-            known = known[:, np.abs(np.diag(triangle)) > _DEPENDENT]
-        kept = np.column_stack([kept, known])
-        self.projected[: kept.shape[1], : kept.shape[1]] = kept.T @ self.projected[: self.count, : self.count] @ kept
-        self.turn(kept)
-        return np.eye(kept.shape[1])[:, : turns.shape[1]]
+            earlier = earlier - basis @ (basis.T @ earlier)
+            earlier, triangle = np.linalg.qr(earlier)
+            earlier = earlier[:, np.abs(np.diag(triangle)) > _DEPENDENT]
+        basis = np.column_stack([basis, earlier])
+        self.projected[: basis.shape[1], : basis.shape[1]] = (
+            basis.T @ self.projected[: self.count, : self.count] @ basis
+        )
+        self.turn(basis)
+        return np.eye(basis.shape[1])[:, : vectors.shape[1]]

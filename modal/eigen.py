@@ -21,9 +21,9 @@ __all__ = [
     "stable", "stable_share", "static_shape", "static_solver",
 ]  # fmt: skip
 
-# of the lowest straining eigenvalue: below every elastic mode, far enough from the rigid ones to factorise safely
+# relative to the lowest straining eigenvalue: below all elastic modes, and far enough from rigid ones to factorise
 _SHIFT = -1e-4
-#: modes beyond those asked for, among which the gap is sought where they are counted; the least gap, relative
+#: further modes among which a gap is sought where modes are counted; the least relative gap
 SPARE = 3
 _GAP = 1e-6
 # more modes than this are found faster slice by slice
@@ -49,15 +49,15 @@ def solve_modes(
             "auto"       iterative where the factors are estimated to need more than half of the memory
     memory  of the machine, bytes; None: found out
 
-    Free and partly held structures show their rigid modes at zero frequency: those whose strain energy is within
+    Free and partly held structures have rigid modes at zero frequency: modes whose strain energy is within
     round-off. Raises SolverError for a count that the structure does not have, no mode in the range, or no convergence.
     """
     free = matrices.free
-    found = chosen(solver, free.size, memory)
+    choice = chosen(solver, free.size, memory)
     pencil, floor = _Pencil.of(matrices), _SHIFT * _straining_eigenvalue(matrices)
     if max_frequency is None and not 1 <= count <= free.size:
         raise SolverError(f"count: expected 1 to {free.size} modes (the free DOFs), not {count}")
-    counted = found["name"] == "factor"
+    counted = choice["name"] == "factor"
     if counted and max_frequency is None:
         eigenvalues, vectors = _lowest(pencil, count, floor)
     elif max_frequency is None:
@@ -75,7 +75,7 @@ def solve_modes(
     signs = shape_signs(vectors, inertia @ matrices.movable_translations()[free])
     shapes = np.zeros((len(eigenvalues), matrices.size))
     shapes[:, free] = signs[:, None] * vectors
-    provenance = dict(matrices.provenance) | {"solver": found | {"counted": counted}}
+    provenance = dict(matrices.provenance) | {"solver": choice | {"counted": counted}}
     return Modes(np.sqrt(eigenvalues) / (2.0 * np.pi), shapes, residuals, provenance)
 
 
@@ -91,16 +91,16 @@ def stable_share(matrices: SystemMatrices, added: sparse.csr_array) -> float:
 
     Stable: the free stiffness is positive definite, as it is without the addition. To three digits below 1.
     """
-    given, added = matrices.of_free(matrices.stiffness), matrices.of_free(added)
+    stiffness, added = matrices.of_free(matrices.stiffness), matrices.of_free(added)
 
     def unstable(share: float) -> bool:
-        return petsc.negative_eigenvalues(sparse.csr_array(given + share * added)) > 0
+        return petsc.negative_eigenvalues(sparse.csr_array(stiffness + share * added)) > 0
 
     if not unstable(1.0):
         return 1.0
     # the energy is linear in the fraction: beyond the first unstable one, as of a single DOF, none is stable
     softer = added.diagonal() < 0.0
-    low, high = 0.0, float(np.min(-given.diagonal()[softer] / added.diagonal()[softer], initial=1.0))
+    low, high = 0.0, float(np.min(-stiffness.diagonal()[softer] / added.diagonal()[softer], initial=1.0))
     while high - low > _SHARE_DIGITS * high:
         middle = 0.5 * (low + high) if low else 0.1 * high
         low, high = (low, middle) if unstable(middle) else (middle, high)
@@ -119,9 +119,9 @@ def static_solver(matrices: SystemMatrices) -> Iterator[Callable[[np.ndarray], n
     with factorize(matrices.of_free(matrices.stiffness)) as factors:
 
         def shape(load: np.ndarray) -> np.ndarray:
-            found = np.zeros(matrices.size)
-            found[free] = factors.solve(load[free])
-            return found
+            displacements = np.zeros(matrices.size)
+            displacements[free] = factors.solve(load[free])
+            return displacements
 
         yield shape
 
@@ -201,7 +201,7 @@ def _within(
     if iteration is not None:
         return values, vectors
     if count <= _SLICE:
-        # the eigenvalues nearest to the middle of an interval are those inside
+        # the eigenvalues nearest to the middle of an interval are inside it
         values, vectors = petsc.nearest_eigenpairs(*pencil, count, 0.5 * (lower + upper) if low_hz else floor)
         if np.all((values > lower) & (values < upper)):
             return values, vectors

@@ -84,14 +84,14 @@ class Material:
         """Return the moduli (n,) at temperatures over `young`. Raises TemperatureError outside `young_at`."""
         if not self.young_at:
             return np.ones_like(temperatures)
-        known, moduli = np.array(self.young_at).T
+        points, moduli = np.array(self.young_at).T
         low, high = temperatures.min(), temperatures.max()
-        if low < known[0] or high > known[-1]:
+        if low < points[0] or high > points[-1]:
             raise TemperatureError(
-                f"young_at: reaches from {known[0]:g} to {known[-1]:g}, the temperatures from {low:g} to {high:g}; "
+                f"young_at: reaches from {points[0]:g} to {points[-1]:g}, the temperatures from {low:g} to {high:g}; "
                 "give the modulus at those, too"
             )
-        return np.asarray(np.interp(temperatures, known, moduli)) / self.young
+        return np.asarray(np.interp(temperatures, points, moduli)) / self.young
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Solid:
         growth = None
         if temperature is not None:
             stretch = self._field(lambda material, values: 1.0 + material.expansion * (values - temperature.reference))
-            # moduli are those of the grown body: E d/dx and the volume give one factor of the stretch, of three
+            # moduli refer to the expanded body: E d/dx and the volume leave one of three factors of the stretch
             softening = self._field(lambda material, values: material.softening(values)) / stretch
             self._lame, self._shear = softening * self._lame, softening * self._shear
             if any(material.expansion for material in self.materials.values()):
@@ -221,7 +221,7 @@ class Solid:
         statics: Statics | None = None,
         speed: float = 0.0,
     ) -> RotatingMatrices:
-        """Return what rotation about an axis through a point (m) makes of the matrices at standstill.
+        """Return the matrices of the structure rotating about an axis through a point (m), from those at standstill.
 
         They hold up to `speed` (rad/s). The stiffness is that about the centrifugal equilibrium, which `statics`
         (default: the body's own) finds, at that speed and at its half in the square, and a polynomial through these.
@@ -241,14 +241,14 @@ class Solid:
             statics=statics,
             greatest=speed,
         )
-        rest = self._expanded
-        before = self._deformation.tangent(rest)
-        with self._equilibria(statics, matrices, matrices.stiffness - before, _NO_CENTRIFUGAL_SOLUTION) as found:
-            self._static_stresses["rotation"] = self.stress(fenicsx.field(self.space, found.solve(load)))
+        standstill = self._expanded
+        before = self._deformation.tangent(standstill)
+        with self._equilibria(statics, matrices, matrices.stiffness - before, _NO_CENTRIFUGAL_SOLUTION) as equilibria:
+            self._static_stresses["rotation"] = self.stress(fenicsx.field(self.space, equilibria.solve(load)))
             if not speed:
                 return still
-            quarter, half, whole = self._followed(found, still, softening, before)
-        linear, *higher = self._deformation.over((rest, half, whole))
+            quarter, half, whole = self._followed(equilibria, still, softening, before)
+        linear, *higher = self._deformation.over((standstill, half, whole))
         rotating = replace(
             still,
             centrifugal_stiffness=sparse.csr_array(linear / speed**2 - softening),
@@ -274,7 +274,7 @@ class Solid:
         measures = [fenicsx.over(self.domain, 3, self.domain.volumes[name]) for name in groups]
         inertia = self._density * ufl.inner(self._trial, self._test)
         stiffness = sum(self._material_stiffness(measure) for measure in measures)
-        return sparse.csr_array(stiffness), sparse.csr_array(sum(fenicsx.matrix(inertia * one) for one in measures))
+        return sparse.csr_array(stiffness), sparse.csr_array(sum(fenicsx.matrix(inertia * dx) for dx in measures))
 
     @cached_property
     def recovery(self) -> StressRecovery:
@@ -292,13 +292,13 @@ class Solid:
         are linear in the displacements.
         """
         self._check_size(displacements, 2)
-        given = np.atleast_2d(displacements)
-        moved = fenicsx.field(self.space, given[0])
-        components, found = self.recovery.mean(self.recovery.of_cells(self.stress(moved)), points), []
-        for displacement in given:
+        fields = np.atleast_2d(displacements)
+        moved = fenicsx.field(self.space, fields[0])
+        components, stresses = self.recovery.mean(self.recovery.of_cells(self.stress(moved)), points), []
+        for displacement in fields:
             moved.x.array[:] = displacement
-            found.append(components())
-        return np.array(found[0] if np.ndim(displacements) == 1 else found)
+            stresses.append(components())
+        return np.array(stresses[0] if np.ndim(displacements) == 1 else stresses)
 
     def stress_errors(self, displacement: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Return an estimate (k,), Pa, of the error of von Mises stresses of displacements (N,) at places (indices)."""
@@ -341,7 +341,7 @@ class Solid:
         """Return a function of material and temperature on the mesh, linear in every cell."""
         assert self.temperature is not None
         at = self.temperature.at
-        return fenicsx.cell_functions(self.domain, lambda name, places: of(self.materials[name], at(places)))
+        return fenicsx.cell_functions(self.domain, lambda name, points: of(self.materials[name], at(points)))
 
     def _heated(self, matrices: SystemMatrices, statics: Statics) -> SystemMatrices:
         """Return the matrices about the thermal equilibrium."""
@@ -351,12 +351,12 @@ class Solid:
         springs = sparse.csr_array(matrices.stiffness - cold)
         with self._equilibria(statics, matrices, springs, _NO_THERMAL_SOLUTION) as equilibria:
             start = equilibria.solve(-self._deformation.force(self._expanded))
-            found = equilibria.under(np.zeros(matrices.size), start)
-        self._expanded = start if found is None else found
+            equilibrium = equilibria.under(np.zeros(matrices.size), start)
+        self._expanded = start if equilibrium is None else equilibrium
         self._static_stresses["temperature"] = self._deformation.stress(fenicsx.field(self.space, self._expanded))
         added = sparse.csr_array(self._deformation.tangent(self._expanded) - cold)
         share = statics.stable_share(matrices, added)
-        if share < 1.0 or found is None:
+        if share < 1.0 or equilibrium is None:
             raise UnstableError(
                 f"temperature: the structure buckles at {share:.3g} of its thermal stress; give it less, or supports "
                 "that let it expand"
@@ -375,13 +375,13 @@ class Solid:
     def _followed(
         self, equilibria: Equilibria, still: RotatingMatrices, softening: sparse.csr_array, before: sparse.csr_array
     ) -> list[np.ndarray]:
-        """Return the displacements (N,) at 1/4, 1/2 and all of the greatest squared speed.
+        """Return the displacements (N,) at 1/4, 1/2 and 1 times the maximum squared speed.
 
-        Newton's method goes straight there. Where that leads to none, or to an unstable one, they are followed in small
-        steps along stable ones, since beyond an instability another equilibrium may be found; but only if the stress
-        alone leaves the structure stable. Raises UnstableError.
+        Newton's method first goes there directly. If it fails, or ends at an unstable equilibrium, stable ones are
+        followed in small steps, since others may exist beyond an instability; but only if the stress by itself leaves
+        the structure stable. Raises UnstableError.
         """
-        top, load, standing, rest = still.greatest**2, still.load, still.standing, self._expanded
+        top, load, standing, standstill = still.greatest**2, still.load, still.standing, self._expanded
         slope = equilibria.solve(load)
         nodes = [0.25 * top, 0.5 * top, top]
 
@@ -389,25 +389,25 @@ class Solid:
             tangent = standing.stiffness + self._deformation.tangent(shape) - before - square * softening
             return still.statics.stable(replace(standing, stiffness=sparse.csr_array(tangent)))
 
-        found, low, here = [], 0.0, rest
+        shapes, low, here = [], 0.0, standstill
         for node in nodes:
             shape = equilibria.under(node * load, here + (node - low) * slope, node * softening)
             if shape is None:
                 break
-            found.append(shape)
+            shapes.append(shape)
             slope = (shape - here) / (node - low)
             low, here = node, shape
         else:
             if stable(here, top):
-                return found
+                return shapes
         slope = equilibria.solve(load)
-        ahead, behind = (self._deformation.geometric(rest + side * top * slope) for side in (1.0, -1.0))
+        ahead, behind = (self._deformation.geometric(standstill + side * top * slope) for side in (1.0, -1.0))
         share = still.statics.stable_share(standing, sparse.csr_array(0.5 * (ahead - behind) - top * softening))
         if share < 1.0:
             raise unstable_at(still.greatest, math.sqrt(share * top))
-        found, low, here, step = [], 0.0, rest, 0.125 * top
+        shapes, low, here, step = [], 0.0, standstill, 0.125 * top
         for _ in range(_MOST_TRIES):
-            node = nodes[len(found)]
+            node = nodes[len(shapes)]
             to = min(low + step, node)
             shape = equilibria.under(to * load, here + (to - low) * slope, to * softening)
             if shape is None or not stable(shape, to):
@@ -416,9 +416,9 @@ class Solid:
             slope = (shape - here) / (to - low)
             low, here, step = to, shape, 2.0 * step
             if to == node:
-                found.append(shape)
+                shapes.append(shape)
             if to == top:
-                return found
+                return shapes
         raise unstable_at(still.greatest, math.sqrt(low))
 
     def _check_size(self, displacements: np.ndarray, most: int = 1) -> None:
@@ -440,8 +440,8 @@ class Solid:
         return fenicsx.matrix(ufl.inner(traction, self._test) * fenicsx.over(domain, 2, domain.facet_group(name)))
 
     def _nodes(self, name: str) -> np.ndarray:
-        parts = [fenicsx.group_nodes(self.space, group, dimension) for dimension, group in self.domain.group(name)]
-        return np.unique(np.concatenate(parts)).astype(np.int64)
+        nodes = [fenicsx.group_nodes(self.space, group, dimension) for dimension, group in self.domain.group(name)]
+        return np.unique(np.concatenate(nodes)).astype(np.int64)
 
     def _patch(self, name: str) -> Patch:
         nodes, facets = self._nodes(name), self.domain.facets.get(name)

@@ -26,7 +26,7 @@ from vanedamp.modal.statics import Statics
 # are; largest ratio of two steps for which older factors serve
 _STEP, _NONE, _SLOW = 1e-6, 1e-10, 0.2
 _MOST_STEPS = 12
-# of the size of the body: displacements of one that has left its shape
+# fraction of the body's size: larger displacements mean that Newton's method diverges
 _GONE = 0.2
 
 
@@ -82,29 +82,29 @@ class Deformation:
 
         shapes  displacements (N,) at a = 0, 1/2 and 1, between which these and, by itself, their stress are quadratic
 
-        Of shapes so interpolated, `deformed` is that of a real shape, never of less than no stiffness. A tangent that
-        was interpolated as a matrix would stretch a slender body where it bends, as it is thousands of times as stiff
-        against the one as against the other.
+        With interpolated shapes, `deformed` belongs to a real shape, so that its stiffness is never negative. An
+        interpolated tangent matrix would stretch a slender body where it bends, and stretching is thousands of times
+        stiffer.
         """
-        rest, half, whole = shapes
-        linear, squared = _quadratic(half - rest, whole - rest)
+        initial, half, whole = shapes
+        linear, squared = _quadratic(half - initial, whole - initial)
         stresses = [self.geometric(shape) for shape in shapes]
         geometric = _quadratic(stresses[1] - stresses[0], stresses[2] - stresses[0])
-        start = self.deformed(rest)
-        # of an even and an odd polynomial of fourth degree, whose values at 1/2 and 1 say all
+        start = self.deformed(initial)
+        # even and odd part of a polynomial of fourth degree, from its values at 1/2 and 1
         ahead, behind = (
-            [self.deformed(rest + a * linear + a**2 * squared) - start for a in (side * 0.5, side)]
+            [self.deformed(initial + a * linear + a**2 * squared) - start for a in (side * 0.5, side)]
             for side in (1.0, -1.0)
         )
-        half_even, even = (0.5 * (one + other) for one, other in zip(ahead, behind, strict=True))
-        half_odd, odd = (0.5 * (one - other) for one, other in zip(ahead, behind, strict=True))
+        half_even, even = (0.5 * (plus + minus) for plus, minus in zip(ahead, behind, strict=True))
+        half_odd, odd = (0.5 * (plus - minus) for plus, minus in zip(ahead, behind, strict=True))
         first, second = (8.0 * half_odd - odd) / 3.0, (16.0 * half_even - even) / 3.0
-        found = first + geometric[0], second + geometric[1], odd - first, even - second
-        return [sparse.csr_array(matrix) for matrix in found]
+        coefficients = first + geometric[0], second + geometric[1], odd - first, even - second
+        return [sparse.csr_array(matrix) for matrix in coefficients]
 
 
 def _quadratic(half: Any, whole: Any) -> tuple[Any, Any]:
-    """Return the coefficients of a and a^2 of what is 0 at a = 0 and has values at 1/2 and 1."""
+    """Return the coefficients of a and a^2 of a polynomial that is 0 at a = 0, from its values at 1/2 and 1."""
     return 4.0 * half - whole, 2.0 * whole - 4.0 * half
 
 
@@ -114,7 +114,7 @@ class Equilibria:
     deformation  of the solid
     statics      by which it is solved
     matrices     about the shape at which it stands
-    springs      (N, N) N/m, what else resists, in proportion to the displacements
+    springs      (N, N) N/m, further stiffness, linear in the displacements
 
     A context manager, which holds the factors. Raises SolverError for a structure that nothing holds.
     """
@@ -143,13 +143,13 @@ class Equilibria:
         if softening is not None:
             linear = sparse.csr_array(linear - softening)
         for _ in range(_MOST_STEPS):
-            rest = load - linear @ here - self._deformation.force(here)
-            change = self.solve(rest)
+            residual = load - linear @ here - self._deformation.force(here)
+            change = self.solve(residual)
             step = float(np.abs(change).max())
             if step > _SLOW * before:
                 try:
                     self._factorise(sparse.csr_array(linear + self._deformation.tangent(here)))
-                    change = self.solve(rest)
+                    change = self.solve(residual)
                 except SolverError:
                     return None
                 step = float(np.abs(change).max())
@@ -162,5 +162,5 @@ class Equilibria:
 
     def _factorise(self, stiffness: sparse.csr_array) -> None:
         self._factors.close()
-        given = replace(self._matrices, stiffness=stiffness)
-        self.solve = self._factors.enter_context(self._statics.solver(given))
+        matrices = replace(self._matrices, stiffness=stiffness)
+        self.solve = self._factors.enter_context(self._statics.solver(matrices))

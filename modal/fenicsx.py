@@ -1,4 +1,4 @@
-"""The one file that knows dolfinx's API, from 0.5.2 to 0.11, in serial.
+"""The only file that uses dolfinx's API, from 0.5.2 to 0.11, in serial.
 
 Differences between the versions are settled here; the rest of the package sees meshes with named groups, and UFL forms
 that become scipy matrices.
@@ -49,7 +49,7 @@ _UNNAMED = "unnamed"
 
 
 class CompilerError(VanedampError):
-    """A machine on which no form can be compiled; the message says what is missing."""
+    """A machine on which no form can be compiled; the message names the missing part."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +59,8 @@ class Domain:
     mesh           dolfinx.mesh.Mesh, metres
     volumes        volume group name -> cell indices; cells outside every group are in the group "unnamed"
     facets         facet group name -> indices of boundary facets
-    edges, points  groups of element edges and of vertices: name -> their indices, without those of its own facets
-    path, sha256   the file and the hash of its bytes, with those of files that it includes
+    edges, points  groups of element edges and of vertices: name -> their indices, except on facets of that name
+    path, sha256   the file and the hash of its bytes, including the files that it includes
     """
 
     mesh: Any
@@ -77,14 +77,14 @@ class Domain:
 
         A name means the facets, edges and points of that name together.
         """
-        found: dict[str, list[tuple[int, np.ndarray]]] = {}
+        entities_of: dict[str, list[tuple[int, np.ndarray]]] = {}
         for dimension, groups in ((2, self.facets), (1, self.edges), (0, self.points)):
             for name, entities in groups.items():
-                found.setdefault(name, []).append((dimension, entities))
-        return found
+                entities_of.setdefault(name, []).append((dimension, entities))
+        return entities_of
 
     def group(self, name: str) -> list[tuple[int, np.ndarray]]:
-        """Return one of `groups`. Raises MeshError with those that exist, by kind."""
+        """Return one of `groups`. Raises MeshError with the existing groups by kind."""
         if name not in self.groups:
             kinds = {"edge": self.edges, "point": self.points}
             lower = "".join(f"; {kind} groups: {', '.join(sorted(names))}" for kind, names in kinds.items() if names)
@@ -102,8 +102,8 @@ class Domain:
         return self.facets[name]
 
     def _no_facets(self, name: str, others: str = "") -> MeshError:
-        known = ", ".join(sorted(self.facets)) or "none"
-        return MeshError(f"{self.path}: no facet group {name!r}; there are: {known}{others}")
+        names = ", ".join(sorted(self.facets)) or "none"
+        return MeshError(f"{self.path}: no facet group {name!r}; there are: {names}{others}")
 
 
 def versions() -> dict[str, str]:
@@ -120,7 +120,10 @@ def read(path: str | os.PathLike[str], scale: float = 1.0, source: Sequence[str 
     groups.
     """
     files = [Path(file) for file in source or [path]]
-    file, sha256 = files[0], hashlib.sha256(b"".join(one.read_bytes() for one in files if one.is_file())).hexdigest()
+    file, sha256 = (
+        files[0],
+        hashlib.sha256(b"".join(item.read_bytes() for item in files if item.is_file())).hexdigest(),
+    )
     with msh.session("read"):
         msh.merge(Path(path))
         try:
@@ -134,7 +137,7 @@ def read(path: str | os.PathLike[str], scale: float = 1.0, source: Sequence[str 
             edges, points = _lower_groups(mesh, lines, nodes)
             facets = _members(tags, names[2])
             _check_boundary(mesh.topology, facets)
-            edges, points = (_beyond(mesh.topology, facets, own, d) for d, own in ((1, edges), (0, points)))
+            edges, points = (_beyond(mesh.topology, facets, groups, d) for d, groups in ((1, edges), (0, points)))
         except MeshError as error:
             raise MeshError(f"{file}: {error}") from error
     return Domain(mesh, _members(cells, names[3]), facets, edges, points, str(file), sha256)
@@ -166,14 +169,14 @@ def cell_constants(domain: Domain, values: Mapping[str, float]) -> Any:
 
 
 def cell_functions(domain: Domain, values: Callable[[str, np.ndarray], np.ndarray]) -> Any:
-    """Return a function that is linear in every cell, its values (n,) given by volume group and places (n, 3), m."""
+    """Return a function that is linear in every cell, with values (n,) by volume group and points (n, 3), m."""
     space = discontinuous_space(domain, 1)
     function = fem.Function(space)
-    places = node_coordinates(space)
+    points = node_coordinates(space)
     dofs = _cell_dofs(space)
     for name, cells in domain.volumes.items():
         inside = dofs[cells].ravel()
-        function.x.array[inside] = values(name, places[inside])
+        function.x.array[inside] = values(name, points[inside])
     return function
 
 
@@ -209,10 +212,10 @@ def vertex_weights(space: Any) -> sparse.csr_array:
     corners = _array(topology.connectivity(3, 0)).reshape(len(nodes), -1)
     # every node from one of the cells that it is in
     _, first = np.unique(nodes, return_index=True)
-    cells, places = np.divmod(first, nodes.shape[1])
+    cells, local = np.divmod(first, nodes.shape[1])
     starts = corners.shape[1] * np.arange(first.size + 1)
     size = (first.size, topology.index_map(0).size_local)
-    weights = sparse.csr_array((shapes[places].ravel(), corners[cells].ravel(), starts), shape=size)
+    weights = sparse.csr_array((shapes[local].ravel(), corners[cells].ravel(), starts), shape=size)
     weights.data[np.abs(weights.data) < 1e-12] = 0.0
     weights.eliminate_zeros()
     return weights
@@ -269,11 +272,11 @@ def facet_normal(domain: Domain, facets: np.ndarray) -> np.ndarray:
     axis = constant(domain, [1.0, 0.0, 0.0])
     with _compiling():
         compiled = fem.form(ufl.inner(axis, ufl.FacetNormal(domain.mesh)) * over(domain, 2, facets))
-    found = np.empty(3)
+    normal = np.empty(3)
     for i, unit in enumerate(np.eye(3)):
         axis.value[:] = unit
-        found[i] = fem.assemble_scalar(compiled)
-    return found
+        normal[i] = fem.assemble_scalar(compiled)
+    return normal
 
 
 def sampler(expression: Any, mesh: Any, points: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -298,9 +301,9 @@ def corners(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
     topology.create_connectivity(3, 0)
     cells = topology.index_map(3).size_local
     vertices = _array(topology.connectivity(3, 0)).reshape(cells, -1)
-    places = np.empty((topology.index_map(0).size_local, 3))
-    places[vertices] = mesh.geometry.x[_corner_nodes(mesh, *vertices.shape)]
-    return vertices, places
+    coordinates = np.empty((topology.index_map(0).size_local, 3))
+    coordinates[vertices] = mesh.geometry.x[_corner_nodes(mesh, *vertices.shape)]
+    return vertices, coordinates
 
 
 def write_fields(space: Any, fields: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> None:
@@ -331,9 +334,9 @@ def _prepare_groups() -> None:
     grouped = {
         entity for tag in msh.groups(3).values() for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag).tolist()
     }
-    rest = [tag for _, tag in gmsh.model.getEntities(3) if tag not in grouped]
-    if rest:
-        gmsh.model.addPhysicalGroup(3, rest, name=_UNNAMED)
+    ungrouped = [tag for _, tag in gmsh.model.getEntities(3) if tag not in grouped]
+    if ungrouped:
+        gmsh.model.addPhysicalGroup(3, ungrouped, name=_UNNAMED)
     msh.check_elements()
     msh.drop_strays()
     gmsh.model.mesh.renumberNodes()
@@ -383,8 +386,8 @@ def _lower_groups(
     tags[cells] = np.asarray(geometry.input_global_indices)[corners] + 1
     ends = tags[_array(topology.connectivity(1, 0)).reshape(-1, 2)]
     return (
-        {name: _found(ends, group, "edge", name) for name, group in lines.items()},
-        {name: _found(tags[:, None], group, "point", name) for name, group in nodes.items()},
+        {name: _indices(ends, group, "edge", name) for name, group in lines.items()},
+        {name: _indices(tags[:, None], group, "point", name) for name, group in nodes.items()},
     )
 
 
@@ -397,31 +400,31 @@ def _corner_nodes(mesh: Any, cells: int, corners: int) -> np.ndarray:
     return _array(of_cells).reshape(cells, -1)[:, :corners]
 
 
-def _found(known: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.ndarray:
-    """Return the indices (int32) of rows of gmsh nodes among known ones. Raises MeshError for one that is not there."""
-    width = int(max(known.max(), wanted.max())) + 1
-    keys, asked = (np.sort(rows, axis=1) @ width ** np.arange(rows.shape[1])[::-1] for rows in (known, wanted))
+def _indices(entities: np.ndarray, wanted: np.ndarray, kind: str, name: str) -> np.ndarray:
+    """Return the indices (int32) of wanted entities, rows of gmsh nodes. Raises MeshError for a missing one."""
+    width = int(max(entities.max(), wanted.max())) + 1
+    keys, asked = (np.sort(rows, axis=1) @ width ** np.arange(rows.shape[1])[::-1] for rows in (entities, wanted))
     order = np.argsort(keys)
-    places = np.minimum(np.searchsorted(keys, asked, sorter=order), keys.size - 1)
-    if np.any(keys[order[places]] != asked):
+    positions = np.minimum(np.searchsorted(keys, asked, sorter=order), keys.size - 1)
+    if np.any(keys[order[positions]] != asked):
         what = "an edge" if kind == "edge" else "a corner"
         raise MeshError(f"{kind} group {name!r} holds what is not {what} of a volume element; mesh it with the volumes")
-    return np.unique(order[places]).astype(np.int32)
+    return np.unique(order[positions]).astype(np.int32)
 
 
 def _beyond(
     topology: Any, facets: Mapping[str, np.ndarray], lower: Mapping[str, np.ndarray], dimension: int
 ) -> dict[str, np.ndarray]:
-    """Return groups of edges (dimension 1) or vertices (0) without those of the facets of their name."""
-    found = {}
+    """Return groups of edges (dimension 1) or vertices (0), except those on facets of the same name."""
+    remaining = {}
     for name, entities in lower.items():
         if name in facets:
             topology.create_connectivity(2, dimension)
             links = topology.connectivity(2, dimension)
             entities = np.setdiff1d(entities, np.concatenate([links.links(facet) for facet in facets[name]]))
         if entities.size:
-            found[name] = entities
-    return found
+            remaining[name] = entities
+    return remaining
 
 
 def _check_boundary(topology: Any, groups: Mapping[str, np.ndarray]) -> None:

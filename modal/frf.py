@@ -8,7 +8,7 @@ import numpy as np
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
-from vanedamp.modal.rational_fit import Fit, Rational
+from vanedamp.modal.rational_fit import PoleFit, Rational
 
 #: powers of i w that a response has over the displacement
 QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}
@@ -16,7 +16,7 @@ QUANTITIES = {"receptance": 0, "mobility": 1, "accelerance": 2}
 UNITS = {"receptance": "m/N", "mobility": "m/(N s)", "accelerance": "m/(N s^2)"}
 # fraction of a damping ratio: a standard deviation above it means that the response does not determine the pole
 _UNCERTAIN = 0.5
-# fraction of the line spacing: in a narrower half-power bandwidth not two lines see a mode rise to half of its peak
+# fraction of the line spacing: with a narrower half-power bandwidth, less than two lines show half of a mode's peak
 _NARROW = 0.5
 # root mean square of the error over the response's: with a larger error, the fit does not describe it. Noise
 # of a tenth of the peak over forty bandwidths leaves 0.41
@@ -131,20 +131,20 @@ def identify(frf: Frf, count: int = 1) -> Poles:
     s = 2j * np.pi * frf.frequencies_hz
     scale, size = np.abs(s).max(), np.abs(frf.values).max()
     problem = Rational(s / scale, frf.values / size, QUANTITIES[frf.quantity])
-    found = problem.fit(problem.relocated(count))
-    order = np.argsort(np.abs(found.poles))
-    poles = found.poles[order]
+    fit = problem.fit(problem.relocated(count))
+    order = np.argsort(np.abs(fit.poles))
+    poles = fit.poles[order]
     fitted, residues = problem.solve(poles)
     result = Poles(
         frequencies_hz=frozen(np.abs(poles) * scale / (2 * np.pi)),
         damping_ratios=frozen(-poles.real / np.abs(poles)),
-        deviations=frozen(_deviations(found, scale)[order]),
+        deviations=frozen(_deviations(fit, scale)[order]),
         residues=frozen(residues * size * scale, complex),
         misfit=float(np.linalg.norm(fitted - problem.values) / np.linalg.norm(problem.values)),
         fitted=frozen(fitted * size, complex),
     )
     _check(result, frf)
-    chance = problem.chance(found)
+    chance = problem.chance(fit)
     if chance > _CHANCE:
         raise FrfError(
             f"count: {count} poles fit the band {_span(frf)} hardly better than {count - 1}: noise does as well with a "
@@ -159,15 +159,15 @@ def is_in_decibels(frf: Frf, poles: Poles) -> bool:
     magnitude = np.abs(frf.values)
     linear = 10.0 ** ((magnitude - magnitude.max()) / 20.0) * np.exp(1j * np.angle(frf.values))
     try:
-        other = identify(Frf(frf.frequencies_hz, linear, frf.quantity), len(poles.frequencies_hz))
+        converted = identify(Frf(frf.frequencies_hz, linear, frf.quantity), len(poles.frequencies_hz))
     except FrfError:
         return False
-    return other.misfit < _DECIBELS * poles.misfit
+    return converted.misfit < _DECIBELS * poles.misfit
 
 
-def _deviations(found: Fit, scale: float) -> np.ndarray:
+def _deviations(fit: PoleFit, scale: float) -> np.ndarray:
     """Return standard deviations (m, 2) of Hz and damping ratio, from the Jacobian; infinite where that is singular."""
-    jacobian, poles = found.jacobian, found.poles
+    jacobian, poles = fit.jacobian, fit.poles
     size = np.linalg.norm(jacobian, axis=0)
     if not np.all(size > 0.0):
         return np.full((poles.size, 2), np.inf)
@@ -175,7 +175,7 @@ def _deviations(found: Fit, scale: float) -> np.ndarray:
     if values[-1] <= values[0] * len(jacobian) * np.finfo(float).eps:
         return np.full((poles.size, 2), np.inf)
     freedom = max(len(jacobian) - jacobian.shape[1], 1)
-    spread = np.sqrt(found.misfit / freedom) * np.linalg.norm(right.T / values, axis=1) / size
+    spread = np.sqrt(fit.misfit / freedom) * np.linalg.norm(right.T / values, axis=1) / size
     frequency, decay = spread.reshape(-1, 2).T
     # lightly damped: |s| moves with its imaginary part, the ratio with the logarithm of its real part
     return np.column_stack([frequency * scale / (2 * np.pi), decay * -poles.real / np.abs(poles)])
@@ -218,7 +218,7 @@ def _check_misfit(poles: Poles, frf: Frf) -> None:
     """Reject a fit that misses the response as a whole or around one of its poles."""
     missed = {f"the band {_span(frf)}": poles.misfit}
     for frequency, ratio in zip(poles.frequencies_hz, poles.damping_ratios, strict=True):
-        # wide enough for one line of those that the least bandwidth allows
+        # wide enough for one line at the least bandwidth
         near = np.abs(frf.frequencies_hz - frequency) <= 2.0 * ratio * frequency
         error = np.linalg.norm((poles.fitted - frf.values)[:, near])
         missed[f"the peak at {frequency:.6g} Hz"] = float(error / np.linalg.norm(frf.values[:, near]))

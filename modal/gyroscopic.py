@@ -24,7 +24,7 @@ from vanedamp.modal.algebra import hermitian_part, orthonormal
 from vanedamp.modal.eigen import SPARE, SolverError, factorize, shape_signs, solve_modes
 from vanedamp.modal.rotating import RotatingMatrices
 
-# residual of a mode; round-off leaves some 1e-8 of a slender beam's first one
+# residual of a mode; round-off leaves about 1e-8 for a slender beam's first mode
 _TOLERANCE = 1e-6
 # corrections of a mode, each as good as a step of a Krylov method, after which something is wrong
 _ROUNDS = 30
@@ -60,22 +60,22 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     """Return the lowest `count` modes at a speed (rad/s), with the gyroscopic coupling.
 
     A space that begins with the modes without it grows by corrections K^-1 Q x, until all residuals are small. That
-    none is missed is proved by the count of those modes or, where they lie too close, by Q's inertia. Raises
+    none is missed is proved by the count of the modes without it or, where they lie too close, by Q's inertia. Raises
     SolverError for a count that the structure does not have, no convergence, or a missed mode, and UnstableError at a
     speed without stable equilibrium.
     """
     matrices = rotating.at(speed)
     free = matrices.free
     stiffness, mass, gyroscopic = map(matrices.of_free, (matrices.stiffness, matrices.mass, rotating.gyroscopic))
-    pencil = _Pencil(stiffness, mass, sparse.csr_array(speed * gyroscopic))
+    pencil = _GyroscopicPencil(stiffness, mass, sparse.csr_array(speed * gyroscopic))
     still = solve_modes(matrices, max(count, min(count + SPARE, free.size)))
     omega, shapes, residuals = _converged(pencil, still.shapes[:, free].T)
     if count < omega.size:
         ceiling, below = _known_count(still.angular_frequencies, speed, count) or _count(pencil, omega, count)
-        found = np.count_nonzero(omega < ceiling)
-        if found != below:
+        counted = np.count_nonzero(omega < ceiling)
+        if counted != below:
             where = f"{ceiling / (2.0 * np.pi):.6g} Hz at {speed:.6g} rad/s"
-            raise SolverError(f"{found} of {below} modes found below {where}; ask for a few more or fewer")
+            raise SolverError(f"{counted} of {below} modes found below {where}; ask for a few more or fewer")
     shapes = shapes[:, :count]
     # the phase at which x^T M x is real and positive
     shapes = np.exp(-0.5j * np.angle(np.einsum("ij,ij->j", shapes, mass @ shapes))) * shapes
@@ -86,7 +86,7 @@ def gyroscopic_modes(rotating: RotatingMatrices, speed: float, count: int = 10) 
     return GyroscopicModes(speed, omega[:count] / (2.0 * np.pi), full, residuals[:count], whirl)
 
 
-class _Pencil(NamedTuple):
+class _GyroscopicPencil(NamedTuple):
     """K, M and W G of the free DOFs."""
 
     stiffness: sparse.csr_array
@@ -94,7 +94,7 @@ class _Pencil(NamedTuple):
     coupling: sparse.csr_array
 
 
-def _converged(pencil: _Pencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _converged(pencil: _GyroscopicPencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return as many modes as a mass-orthonormal space (n, m) has: frequencies, shapes (n, m) and residuals."""
     stiffness, mass, coupling = pencil
     count = space.shape[1]
@@ -102,10 +102,10 @@ def _converged(pencil: _Pencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarr
         for _ in range(_ROUNDS):
             omega, shapes = _within(pencil, space, count)
             forces = stiffness @ shapes
-            rest = forces + 1j * omega * (coupling @ shapes) - omega**2 * (mass @ shapes)
-            parts = np.hstack([rest.real, rest.imag])
-            corrections = factors.solve(parts)
-            works = np.einsum("ij,ij->j", parts, corrections).reshape(2, -1).sum(axis=0)
+            residual = forces + 1j * omega * (coupling @ shapes) - omega**2 * (mass @ shapes)
+            columns = np.hstack([residual.real, residual.imag])
+            corrections = factors.solve(columns)
+            works = np.einsum("ij,ij->j", columns, corrections).reshape(2, -1).sum(axis=0)
             residuals = np.sqrt(works / np.einsum("ij,ij->j", shapes.conj(), forces).real)
             late = np.tile(residuals > _TOLERANCE, 2)
             if not late.any():
@@ -114,7 +114,7 @@ def _converged(pencil: _Pencil, space: np.ndarray) -> tuple[np.ndarray, np.ndarr
     raise SolverError(f"modes with the gyroscopic coupling keep residuals of {residuals.max():.1e}")
 
 
-def _within(pencil: _Pencil, space: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _within(pencil: _GyroscopicPencil, space: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest frequencies (rad/s) and shapes (n, count), x^H M x = 1, within a mass-orthonormal space."""
     small = (space.T @ (matrix @ space) for matrix in (pencil.stiffness, pencil.coupling))
     omega, shapes = dense_modes(*small)
@@ -128,17 +128,17 @@ def dense_modes(stiffness: np.ndarray, coupling: np.ndarray) -> tuple[np.ndarray
     frequencies kappa, velocities v and scaled displacements y = kappa x obey the skew system v' + W G v + kappa y = 0,
     y' = kappa v.
     """
-    squares, turn = linalg.eigh(hermitian_part(stiffness))
-    kappa, coupled = np.sqrt(squares), turn.conj().T @ coupling @ turn
+    squares, modes = linalg.eigh(hermitian_part(stiffness))
+    kappa, coupled = np.sqrt(squares), modes.conj().T @ coupling @ modes
     skew = np.block([[0.5 * (coupled - coupled.conj().T), np.diag(kappa)], [-np.diag(kappa), np.zeros_like(coupled)]])
     omega, vectors = linalg.eigh(1j * skew)
     size = len(kappa)
     shapes = vectors[size:, size:] / kappa[:, None]
-    return omega[size:], turn @ (shapes / np.linalg.norm(shapes, axis=0))
+    return omega[size:], modes @ (shapes / np.linalg.norm(shapes, axis=0))
 
 
 def _known_count(still: np.ndarray, speed: float, count: int) -> tuple[float, int] | None:
-    """Return a frequency (rad/s) above `count` modes and how many lie below it, if the modes without coupling tell."""
+    """Return a frequency (rad/s) above `count` modes and how many lie below it; None: not known without coupling."""
     last = np.arange(count, len(still))
     lower = np.hypot(still[last - 1], speed) + speed
     upper = np.hypot(still[last], speed) - speed
@@ -148,7 +148,7 @@ def _known_count(still: np.ndarray, speed: float, count: int) -> tuple[float, in
     return 0.5 * float(lower[widest] + upper[widest]), int(last[widest])
 
 
-def _count(pencil: _Pencil, omega: np.ndarray, count: int) -> tuple[float, int]:
+def _count(pencil: _GyroscopicPencil, omega: np.ndarray, count: int) -> tuple[float, int]:
     """Return the same from the inertia of Q, in the widest gap of the frequencies found."""
     last = count + int(np.argmax(np.diff(omega[count - 1 :])))
     ceiling = 0.5 * float(omega[last - 1] + omega[last])

@@ -29,13 +29,13 @@ _LIMITS = (_TOLERANCE, _TOLERANCE**0.5, 0.1)
 _SHIFT = 10.0
 # bytes of the factor of a compact block of n DOFs, over n^(4/3): 20 numbers, by METIS (19,494 and 56,862 DOFs)
 _FACTOR = 160.0
-# part of the memory that a factor may take: matrices, workspace and the count of modes need as much again
+# fraction of the memory that a factor may take: matrices, workspace and the count of modes need as much again
 _PART = 0.5
-# where a container says how much memory it may have
+# files with the memory limit of a container
 _LIMIT_FILES = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
-# of a motion at the fixed DOFs, squared and on average, that is round-off
+# mean squared motion at the fixed DOFs that is round-off
 _ALLOWED = 1e-20
-# modes that a range of frequencies is first tried with
+# number of modes first tried for a range of frequencies
 _FIRST = 10
 
 
@@ -55,11 +55,11 @@ def chosen(solver: str, size: int, memory: float | None = None) -> dict[str, Any
 
 def machine_memory() -> int:
     """Return the memory of this machine, or of its container, bytes."""
-    found = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     for file in _LIMIT_FILES:
         with contextlib.suppress(OSError, ValueError):  # no container, or "max"
-            found = min(found, int(file.read_text()))
-    return found
+            memory = min(memory, int(file.read_text()))
+    return memory
 
 
 class Iteration:
@@ -125,31 +125,31 @@ class Iteration:
 
     def _vertex_multigrid(self, vertices: sparse.csr_array) -> VertexMultigrid:
         up = sparse.csr_array(sparse.kron(vertices, sparse.identity(3), format="csr"))
-        # of a vertex that is held, nothing is left but what its neighbours would follow
-        held = np.ones(up.shape[0])
-        held[self._free] = 0.0
-        to_vertices = sparse.csr_array(up[self._free][:, held @ up < 1.0])
+        # a fixed vertex has no motion of its own
+        is_fixed = np.ones(up.shape[0])
+        is_fixed[self._free] = 0.0
+        to_vertices = sparse.csr_array(up[self._free][:, is_fixed @ up < 1.0])
         coarse = [sparse.csr_array(to_vertices.T @ (matrix @ to_vertices)) for matrix in (self._stiffness, self._mass)]
         return VertexMultigrid(self._stiffness, to_vertices, sparse.csr_array(coarse[0] - self._floor * coarse[1]))
 
     def _aggregation(self) -> Aggregation:
         # the three DOFs of each node that can move
         dofs = (3 * np.unique(self._free // 3)[:, None] + np.arange(3)).ravel()
-        places = np.searchsorted(dofs, self._free)
+        columns = np.searchsorted(dofs, self._free)
         motions = np.zeros((6, dofs.size))
-        motions[:, places] = self._rigid_motions()[:, self._free]
-        return Aggregation(sparse.csr_array(self._stiffness - self._floor * self._mass), places, motions)
+        motions[:, columns] = self._rigid_motions()[:, self._free]
+        return Aggregation(sparse.csr_array(self._stiffness - self._floor * self._mass), columns, motions)
 
     def _rigid_modes(self) -> np.ndarray:
         """Return the rigid motions (0 to 6, n) that fixed DOFs allow: a start that round-off cannot spoil."""
         motions = self._rigid_motions()
-        held = np.delete(motions, self._free, axis=1)
-        _, sizes, turns = np.linalg.svd(held @ held.T)
-        return turns[sizes <= _ALLOWED * motions.shape[1]] @ motions[:, self._free]
+        at_supports = np.delete(motions, self._free, axis=1)
+        _, sizes, combinations = np.linalg.svd(at_supports @ at_supports.T)
+        return combinations[sizes <= _ALLOWED * motions.shape[1]] @ motions[:, self._free]
 
     def _rigid_motions(self) -> np.ndarray:
         """Return translations and rotations (6, N), each about 1 in size."""
         offsets = self._coordinates - self._coordinates.mean(axis=0)
         offsets = offsets / (np.abs(offsets).max() or 1.0)
-        turns = [np.cross(axis, offsets).ravel() for axis in np.eye(3)]
-        return np.vstack([np.tile(np.eye(3), (1, len(offsets))), turns])
+        rotations = [np.cross(axis, offsets).ravel() for axis in np.eye(3)]
+        return np.vstack([np.tile(np.eye(3), (1, len(offsets))), rotations])

@@ -8,9 +8,9 @@ from scipy.spatial import cKDTree
 from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.modal.records.modes import Modes
 
-# of the largest extent: nodes nearer than this lie at one place
+# fraction of the largest extent: nodes closer than this coincide
 _SAME = 1e-6
-# fraction of a mode that may differ from a motion of a rigid body
+# fraction by which a mode may differ from a rigid motion
 _STRAINED = 1e-3
 
 
@@ -27,6 +27,6 @@ def free_motions(modes: Modes, matrices: SystemMatrices) -> tuple[int, int]:
     turned = [np.cross(axis, arms).ravel() for axis in np.eye(3)]
     rigid = np.linalg.qr(np.column_stack([matrices.rigid_translations(), *turned]))[0]
     shapes = modes.shapes[modes.frequencies_hz == 0.0]
-    rest = shapes - (shapes @ rigid) @ rigid.T
-    apart = np.linalg.norm(rest, axis=1) > _STRAINED * np.linalg.norm(shapes, axis=1)
+    internal = shapes - (shapes @ rigid) @ rigid.T
+    apart = np.linalg.norm(internal, axis=1) > _STRAINED * np.linalg.norm(shapes, axis=1)
     return int(np.sum(~apart)), int(np.sum(apart))

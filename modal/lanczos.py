@@ -33,7 +33,7 @@ class NotConvergedError(ArithmeticError):
 
 
 def block(count: int) -> int:
-    """Return how many right-hand sides a solve has for `count` eigenpairs: fewer cost more each, more are more work."""
+    """Return the number of right-hand sides per solve for `count` eigenpairs: fewer cost more each, more add work."""
     return min(max(count // 4, 4), 12)
 
 
@@ -65,12 +65,12 @@ def eigenpairs(
             if space.block == 0:  # at the start, or the space holds all that its start can reach
                 space.begin(solve(space.mass(random.standard_normal((width, space.size)))))
             leak = space.extend(solve)
-            values, turns = space.ritz(wanted)
-            residuals = np.linalg.norm(leak @ turns[-leak.shape[1] :], axis=0)
+            values, vectors = space.ritz(wanted)
+            residuals = np.linalg.norm(leak @ vectors[-leak.shape[1] :], axis=0)
             size = np.abs(values)
             converged = residuals <= np.maximum(limits[: len(values)] * size, _ROUND_OFF * size.max())
             if len(values) == wanted and converged.all():
-                return shift + 1.0 / values, turns.T @ space.vectors[: len(turns)]
+                return shift + 1.0 / values, vectors.T @ space.vectors[: len(vectors)]
         space.restart(wanted + 2 * width)
     raise NotConvergedError(f"{np.count_nonzero(converged)} of {wanted} modes converged")
 
@@ -98,16 +98,16 @@ class _Krylov(Subspace):
 
     def ritz(self, wanted: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the largest Ritz values by size (w,), and their vectors (k, w) in the rows the operator has met."""
-        known = self.count - self.block
-        values, turns = np.linalg.eigh(self.projected[:known, :known])
+        size = self.count - self.block
+        values, vectors = np.linalg.eigh(self.projected[:size, :size])
         largest = np.argsort(-np.abs(values), kind="stable")[:wanted]
-        return values[largest], turns[:, largest]
+        return values[largest], vectors[:, largest]
 
-    def restart(self, kept: int) -> None:
+    def restart(self, count: int) -> None:
         """Keep the best Ritz vectors and the last block only."""
-        values, turns = self.ritz(kept)
-        last = self.vectors[len(turns) : self.count].copy()
-        self.turn(turns)
+        values, vectors = self.ritz(count)
+        last = self.vectors[len(vectors) : self.count].copy()
+        self.turn(vectors)
         self.vectors[self.count : self.count + self.block] = last
         self.projected[:] = 0.0
         self.projected[np.arange(len(values)), np.arange(len(values))] = values

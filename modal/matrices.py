@@ -14,7 +14,7 @@ from scipy import sparse
 
 from vanedamp.files import store
 from vanedamp.files.errors import LARGEST, VanedampError
-from vanedamp.files.record import Array, Own, Record, Sparse
+from vanedamp.files.record import Array, Own, Record, SparseMatrix
 from vanedamp.files.sparse_indices import SparseError, within_shape
 
 # assembly adds the same numbers in another order above and below the diagonal
@@ -64,17 +64,17 @@ class Patch:
 
 def _patch_variables(patches: Mapping[str, Patch]) -> dict[str, store.Variable]:
     """Return patches as variables of a file."""
-    parts = list(patches.values())
+    values = list(patches.values())
     return {
         "patch": store.Variable(np.array(list(patches), dtype=object), ("patch",)),
-        "patch_offset": store.Variable(np.cumsum([0] + [part.nodes.size for part in parts]), ("patch_edge",)),
+        "patch_offset": store.Variable(np.cumsum([0] + [patch.nodes.size for patch in values]), ("patch_edge",)),
         "patch_nodes": store.Variable(
-            np.concatenate([np.empty(0, np.int64), *(part.nodes for part in parts)]), ("patch_entry",)
+            np.concatenate([np.empty(0, np.int64), *(patch.nodes for patch in values)]), ("patch_entry",)
         ),
         "patch_weights": store.Variable(
-            np.concatenate([np.empty(0), *(part.weights for part in parts)]), ("patch_entry",), "m^2"
+            np.concatenate([np.empty(0), *(patch.weights for patch in values)]), ("patch_entry",), "m^2"
         ),
-        "patch_normal": store.Variable(np.reshape([part.normal for part in parts], (-1, 3)), ("patch", "axis")),
+        "patch_normal": store.Variable(np.reshape([patch.normal for patch in values], (-1, 3)), ("patch", "axis")),
     }
 
 
@@ -93,9 +93,9 @@ class SystemMatrices(Record):
     """Unconstrained finite element matrices in displacement DOFs, dof = 3 * node + component, N = 3 * n_nodes."""
 
     KIND: ClassVar[str] = "system-matrices"
-    stiffness: Annotated[sparse.csr_array, Sparse("N/m")]
+    stiffness: Annotated[sparse.csr_array, SparseMatrix("N/m")]
     """(N, N), symmetric"""
-    mass: Annotated[sparse.csr_array, Sparse("kg")]
+    mass: Annotated[sparse.csr_array, SparseMatrix("kg")]
     """(N, N), symmetric"""
     coordinates: Annotated[np.ndarray, Array(("node", "axis"), "m")]
     """of the nodes"""
@@ -179,7 +179,7 @@ class SystemMatrices(Record):
     def patch(self, label: str | Sequence[str]) -> Patch:
         """Return the patch of that label, or of several as one. Raises MatricesError with the labels that exist."""
         if not isinstance(label, str):
-            return _merged([self.patch(one) for one in label])
+            return _merged([self.patch(name) for name in label])
         if label not in self.patches:
             raise MatricesError(f"no patch {label!r}; there are: {', '.join(sorted(self.patches)) or 'none'}")
         return self.patches[label]
@@ -189,8 +189,8 @@ def _merged(patches: Sequence[Patch]) -> Patch:
     """Return several patches as one; a common node has the sum of its weights."""
     if not patches:
         raise MatricesError("patch: no label; name at least one")
-    nodes, places = np.unique(np.concatenate([patch.nodes for patch in patches]), return_inverse=True)
-    weights = np.bincount(places, np.concatenate([patch.weights for patch in patches]))
+    nodes, indices = np.unique(np.concatenate([patch.nodes for patch in patches]), return_inverse=True)
+    weights = np.bincount(indices, np.concatenate([patch.weights for patch in patches]))
     areas = np.array([patch.area for patch in patches])
     return Patch(nodes, weights, areas @ [patch.normal for patch in patches] / areas.sum())
 

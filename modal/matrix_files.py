@@ -50,7 +50,7 @@ def read_matrices(
 
     stiffness, mass  .mtx (Matrix Market, symmetric or general, or Abaqus), .npz (scipy.sparse.save_npz), .csv (dense),
                      .mat, or CalculiX's .sti and .mas with their .dof, N/m and kg; of a file with several matrices
-                     those named stiffness and mass, or K and M
+                     the ones named stiffness and mass, or K and M
     nodes            CSV: node, x, y, z (m), in the order of the degrees of freedom; any whole numbers as labels, in
                      any order for CalculiX, and for Abaqus' matrices that name their nodes. Degrees of freedom that
                      CalculiX's .dof leaves out are held
@@ -63,12 +63,12 @@ def read_matrices(
     """
     labels, coordinates = _nodes(Path(nodes))
     patches = {} if sets is None else _patches(Path(sets), labels)
-    held = [np.empty(0, dtype=int)]
+    dofs = [np.empty(0, dtype=int)]
     for name, components in (fixed or {}).items():
         if name not in patches:
             raise MatricesError(f"{sets}: no set {name!r} to hold; there are: {', '.join(sorted(patches)) or 'none'}")
-        held += [3 * patches[name].nodes + _component(sets, component) for component in components]
-    fixed_dofs = np.concatenate(held)
+        dofs += [3 * patches[name].nodes + _component(sets, component) for component in components]
+    fixed_dofs = np.concatenate(dofs)
     return _system(stiffness, mass, labels, coordinates, fixed_dofs, patches, damping_ratio, scale, mass_scale)
 
 
@@ -82,12 +82,12 @@ def read_folder(
     fixed = np.empty(0, dtype=int)
     if (home / "fixed.csv").is_file():
         rows = _rows(home / "fixed.csv", ("node", "components"))
-        held = [
+        dofs = [
             3 * _index(home / "fixed.csv", labels, node) + _component(home / "fixed.csv", component)
             for node, components in rows
             for component in components.strip()
         ]
-        fixed = np.array(held, dtype=int)
+        fixed = np.array(dofs, dtype=int)
     stiffness, mass = (_either(home, name) for name in ("stiffness", "mass"))
     return _system(stiffness, mass, labels, coordinates, fixed, patches, damping_ratio, scale, mass_scale)
 
@@ -109,10 +109,10 @@ def write_folder(matrices: SystemMatrices, folder: str | os.PathLike[str]) -> No
         for node, weight in zip(patch.nodes, patch.weights, strict=True)
     ]
     write_csv(home / "sets.csv", ("set", "node", "weight"), entries)
-    held: dict[int, str] = {}
+    components: dict[int, str] = {}
     for dof in matrices.fixed.tolist():
-        held[dof // 3 + 1] = held.get(dof // 3 + 1, "") + _COMPONENTS[dof % 3]
-    write_csv(home / "fixed.csv", ("node", "components"), [list(item) for item in held.items()])
+        components[dof // 3 + 1] = components.get(dof // 3 + 1, "") + _COMPONENTS[dof % 3]
+    write_csv(home / "fixed.csv", ("node", "components"), [list(item) for item in components.items()])
 
 
 def _system(
@@ -132,8 +132,8 @@ def _system(
     for name, path in (("stiffness", stiffness), ("mass", mass)):
         matrix = _matrix(Path(path), name)
         if Path(path).suffix.lower() in _CALCULIX:
-            matrix, held = _placed(Path(path).with_suffix(".dof"), matrix, labels)
-            fixed = np.union1d(fixed, held)
+            matrix, missing = _placed(Path(path).with_suffix(".dof"), matrix, labels)
+            fixed = np.union1d(fixed, missing)
         elif getattr(matrix, "freedoms", None) is not None:
             matrix = _by_node(Path(path), matrix, matrix.freedoms, labels)
         loaded[name] = matrix
@@ -144,9 +144,9 @@ def _system(
             )
         diagonal = matrix.diagonal()
         if diagonal.min(initial=0.0) < 0.0:
-            place = int(diagonal.argmin())
+            dof = int(diagonal.argmin())
             raise MatricesError(
-                f"{path}: degree of freedom {place} has {diagonal[place]:.3g} on the diagonal; check its sign"
+                f"{path}: degree of freedom {dof} has {diagonal[dof]:.3g} on the diagonal; check its sign"
             )
     system = SystemMatrices(
         **loaded,
@@ -175,30 +175,30 @@ def _matrix(path: Path, name: str) -> sparse.csr_array:
             ".csv, or .sti and .mas (CalculiX)"
         )
     try:
-        found = _READERS[path.suffix.lower()](str(path))
-        matrix = _named(path, name, found) if isinstance(found, dict) else found
+        content = _READERS[path.suffix.lower()](str(path))
+        matrix = _named(path, name, content) if isinstance(content, dict) else content
         return matrix if isinstance(matrix, GlobalMatrix) else sparse.csr_array(matrix)
     except MatricesError:
         raise
-    except Exception as error:  # the readers raise what they stumble over
+    except Exception as error:  # the readers raise many types
         raise MatricesError(f"{path}: not a readable matrix ({error})") from error
 
 
 def _placed(path: Path, matrix: sparse.csr_array, labels: Mapping[int, int]) -> tuple[sparse.csr_array, np.ndarray]:
-    """Return a matrix among all degrees of freedom, and those that a .dof file, lines of node.direction, leaves out."""
+    """Return a matrix over all degrees of freedom, and those missing in a .dof file (lines of node.direction)."""
     words = existing(path, MatricesError, "file of the matrix's coordinates").read_text(errors="replace").split()
-    places = []
+    dofs = []
     for number, word in enumerate(words, 1):
         node, _, direction = word.partition(".")
         if direction not in ("1", "2", "3"):
             raise MatricesError(f"{path}: line {number}: expected node.direction with directions 1 to 3, not {word!r}")
-        places.append(3 * _index(path, labels, node) + int(direction) - 1)
-    if len(set(places)) < len(places) or matrix.shape != (len(places), len(places)):
-        raise MatricesError(f"{path}: {len(set(places))} different coordinates for a matrix {matrix.shape}")
+        dofs.append(3 * _index(path, labels, node) + int(direction) - 1)
+    if len(set(dofs)) < len(dofs) or matrix.shape != (len(dofs), len(dofs)):
+        raise MatricesError(f"{path}: {len(set(dofs))} different coordinates for a matrix {matrix.shape}")
     entries, size = sparse.coo_array(matrix), 3 * len(labels)
-    rows, columns = (np.array(places)[index] for index in (entries.row, entries.col))
+    rows, columns = (np.array(dofs)[index] for index in (entries.row, entries.col))
     placed = sparse.csr_array((entries.data, (rows, columns)), shape=(size, size))
-    return placed, np.setdiff1d(np.arange(size), places)
+    return placed, np.setdiff1d(np.arange(size), dofs)
 
 
 def _by_node(path: Path, matrix: GlobalMatrix, rows: np.ndarray, labels: Mapping[int, int]) -> sparse.csr_array:
@@ -206,25 +206,25 @@ def _by_node(path: Path, matrix: GlobalMatrix, rows: np.ndarray, labels: Mapping
     nodes, freedoms = rows.T
     if np.any((freedoms < 1) | (freedoms > 3)):
         raise MatricesError(f"{path}: node {nodes[0]} has the freedom {max(freedoms)}; expected 1, 2 and 3")
-    places = np.array([3 * _index(path, labels, str(node)) for node in nodes.tolist()]) + freedoms - 1
-    if len(places) != 3 * len(labels):
-        lost = next(label for label, index in labels.items() if 3 * index not in set(places.tolist()))
+    dofs = np.array([3 * _index(path, labels, str(node)) for node in nodes.tolist()]) + freedoms - 1
+    if len(dofs) != 3 * len(labels):
+        lost = next(label for label, index in labels.items() if 3 * index not in set(dofs.tolist()))
         raise MatricesError(f"{path}: the matrix has no node {lost}; give the nodes of the matrix only")
     entries = sparse.coo_array(matrix)
-    return sparse.csr_array((entries.data, (places[entries.row], places[entries.col])), shape=matrix.shape)
+    return sparse.csr_array((entries.data, (dofs[entries.row], dofs[entries.col])), shape=matrix.shape)
 
 
-def _named(path: Path, name: str, found: Mapping[str, Any]) -> Any:
-    """Return the only matrix of a file, or the one of that name or letter."""
-    names = [own for own in found if len(found) == 1 or own.lower() == name] or [
-        own for own in found if own == _LETTERS[name]
+def _named(path: Path, name: str, matrices: Mapping[str, Any]) -> Any:
+    """Return the only matrix of a file, or the matrix with that name or letter."""
+    names = [key for key in matrices if len(matrices) == 1 or key.lower() == name] or [
+        key for key in matrices if key == _LETTERS[name]
     ]
     if len(names) != 1:
         raise MatricesError(
             f"{path}: expected one matrix, or one named {name} or {_LETTERS[name]}; there are: "
-            f"{', '.join(found) or 'none'}"
+            f"{', '.join(matrices) or 'none'}"
         )
-    return found[names[0]]
+    return matrices[names[0]]
 
 
 def _either(home: Path, name: str) -> Path:
@@ -255,8 +255,8 @@ def _patches(path: Path, labels: dict[int, int]) -> dict[str, Patch]:
         members.setdefault(row[0], []).append((_index(path, labels, row[1]), weight))
     try:
         return {
-            name: Patch(np.array([node for node, _ in found]), np.array([weight for _, weight in found]))
-            for name, found in members.items()
+            name: Patch(np.array([node for node, _ in pairs]), np.array([weight for _, weight in pairs]))
+            for name, pairs in members.items()
         }
     except MatricesError as error:
         raise MatricesError(f"{path}: {error}") from error

@@ -21,9 +21,9 @@ import numpy as np
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.foreign import existing, reading
 from vanedamp.files.formats.lab_table import Column, LabTable, lab_table
-from vanedamp.files.formats.lab_units import Unit
+from vanedamp.files.formats.lab_units import LabUnit
 from vanedamp.files.formats.lab_units import unit as lab_unit
-from vanedamp.files.formats.meshes.frames import Frame
+from vanedamp.files.formats.meshes.frames import CoordinateSystem
 from vanedamp.files.formats.meshes.universal_systems import frame_of, systems
 from vanedamp.files.formats.universal_datasets import (
     COMPLEX_MODE,
@@ -104,7 +104,7 @@ def read_frf(
     A table has a column of frequencies, then of every response one column of complex numbers, or two: real and
     imaginary part, or magnitude and phase. The header says which, with units; values are converted to SI.
 
-    quantity   receptance, mobility or accelerance (default: that of the unit, or else receptance)
+    quantity   receptance, mobility or accelerance (default: by the unit, or else receptance)
     columns    one of COLUMNS where the header does not say; columns that look like magnitude and phase, without a word
                that says so, are rejected
     unit       of the values, where the file gives none: "g/N", "dB re 1 m/N"
@@ -121,14 +121,16 @@ def read_frf(
             frequencies, responses, source = _frf_of_universal(file, unit)
     else:
         frequencies, responses, source = _frf_of_table(lab_table(file, MeasurementError), columns, unit)
-    quantities = {own.of.quantity: own for own in responses if own.of is not None}
+    quantities = {response.of.quantity: response for response in responses if response.of is not None}
     if len(quantities) > 1 or (quantity and quantities and quantity not in quantities):
-        told = ", ".join(f"{own.label or 'response'} in {own.of.text}" for own in quantities.values() if own.of)
-        raise MeasurementError(
-            f"{file}: quantity: expected responses of one kind, {quantity or 'by their units'}; got {told}"
+        listed = ", ".join(
+            f"{response.label or 'response'} in {response.of.text}" for response in quantities.values() if response.of
         )
-    values = np.array([own.values for own in responses])
-    labels = [own.label for own in responses]
+        raise MeasurementError(
+            f"{file}: quantity: expected responses of one kind, {quantity or 'by their units'}; got {listed}"
+        )
+    values = np.array([response.values for response in responses])
+    labels = [response.label for response in responses]
     with _of(file):
         frf = Frf(
             frequencies, values.conj() if conjugate else values, next(iter(quantities), quantity or "receptance"),
@@ -143,22 +145,25 @@ class _Response(NamedTuple):
 
     label: str
     values: np.ndarray
-    of: Unit | None
+    of: LabUnit | None
 
 
-def _frf_of_table(table: LabTable, columns: str | None, given: str | None) -> tuple[np.ndarray, list[_Response], str]:
+def _frf_of_table(table: LabTable, columns: str | None, unit: str | None) -> tuple[np.ndarray, list[_Response], str]:
     """Return frequencies (n,) Hz, responses, and how they were read."""
     axis = next((column for column in table.columns if column.role == "frequency"), table.columns[0])
     if axis.header and axis.role != "frequency" and (axis.unit or axis.unknown):
         raise table.error(f"{table.path}: {axis.header!r}: expected the frequency, such as 'frequency [Hz]'")
     default = "" if re.match(r"omega|ω", axis.name.lower()) else "Hz"
-    frequencies, rest = table.si(axis, "frequency", default), [column for column in table.columns if column is not axis]
-    told = {
+    frequencies, data = (
+        table.si(axis, "frequency", default),
+        [column for column in table.columns if column is not axis],
+    )
+    roles = {
         axis.header or "first column": f"frequency in {(axis.unit or table.unit_of(axis, 'frequency', default)).text}"
     }
     responses = list[_Response]()
-    for label, kind, first, second in _pairs(table, rest, columns):
-        of = _unit_of(table, first, second, given)
+    for label, kind, first, second in _pairs(table, data, columns):
+        of = _unit_of(table, first, second, unit)
         values, scale = table.numbers(first), 1.0 if of is None else of.factor
         text = "in SI" if of is None else f"in {of.text}"
         if of is not None and of.decibels:
@@ -178,24 +183,26 @@ def _frf_of_table(table: LabTable, columns: str | None, given: str | None) -> tu
                 )
         responses.append(_Response(label, scale * values, of))
         headers = [column.header for column in (first, second) if column is not None]
-        told[" and ".join(headers) if all(headers) else f"columns {first.place + 1} on"] = f"{kind} {text}"
-    return frequencies, responses, table.reading(told)
+        roles[" and ".join(headers) if all(headers) else f"columns {first.position + 1} on"] = f"{kind} {text}"
+    return frequencies, responses, table.reading(roles)
 
 
 def _pairs(
-    table: LabTable, rest: list[Column], columns: str | None
+    table: LabTable, data: list[Column], columns: str | None
 ) -> Iterator[tuple[str, str, Column, Column | None]]:
     """Yield label, one of COLUMNS or "complex", and the columns of each response."""
-    left = list(rest)
-    while left:
-        first = left.pop(0)
+    unpaired = list(data)
+    while unpaired:
+        first = unpaired.pop(0)
         if table.is_complex(first):
             yield _label(first), "complex", first, None
             continue
         part = _part(first)
-        fits = [column for column in left if _part(column) == _PARTNERS.get(part, "") and not table.is_complex(column)]
+        fits = [
+            column for column in unpaired if _part(column) == _PARTNERS.get(part, "") and not table.is_complex(column)
+        ]
         second = next((column for column in fits if _label(column) == _label(first)), None) or next(
-            (column for column in left[:1] if column in fits), None
+            (column for column in unpaired[:1] if column in fits), None
         )
         if second is None:
             of = f" of {first.header!r}" if first.header else ""
@@ -203,27 +210,27 @@ def _pairs(
                 f"{table.path}: expected the columns frequency, real part, imaginary part (or magnitude and phase, or "
                 f"complex numbers; and more pairs), not {len(table.columns)} columns: no other part{of}"
             )
-        left.remove(second)
+        unpaired.remove(second)
         yield _label(first), _columns(table, columns, first, second), first, second
 
 
-def _columns(table: LabTable, given: str | None, first: Column, second: Column) -> str:
+def _columns(table: LabTable, columns: str | None, first: Column, second: Column) -> str:
     """Return which of COLUMNS two columns are."""
-    if given is not None:
-        return given
+    if columns is not None:
+        return columns
     if _part(first) == "real":
         return "real-imaginary"
-    one, other = table.numbers(first), table.numbers(second)
+    values, partner = table.numbers(first), table.numbers(second)
     if _part(first) == "magnitude":
         if second.unit is not None:
             return "magnitude-radians" if second.unit.factor > 0.5 else "magnitude-degrees"
-        if np.abs(other).max() > 2.02 * np.pi:
+        if np.abs(partner).max() > 2.02 * np.pi:
             return "magnitude-degrees"
         raise table.error(
             f"{table.path}: columns: {second.header!r}: in degrees or radians? Say so there, or by columns = "
             "magnitude-degrees or magnitude-radians"
         )
-    if (np.all(one > 0.0) or np.all(one < 0.0)) and np.abs(other).max() <= 361.0 and np.ptp(other) > 0.1:
+    if (np.all(values > 0.0) or np.all(values < 0.0)) and np.abs(partner).max() <= 361.0 and np.ptp(partner) > 0.1:
         raise table.error(
             f"{table.path}: columns: a response's first column keeps its sign, its second one looks like a phase; say "
             f"what they are by a header line or by columns = one of {', '.join(COLUMNS)}"
@@ -231,24 +238,28 @@ def _columns(table: LabTable, given: str | None, first: Column, second: Column) 
     return "real-imaginary"
 
 
-def _unit_of(table: LabTable, first: Column, second: Column | None, given: str | None) -> Unit | None:
+def _unit_of(table: LabTable, first: Column, second: Column | None, text: str | None) -> LabUnit | None:
     """Return the unit of a response, by its header or as given."""
-    units = {own.unit for own in (first, second) if own is not None and own.unit and own.unit.quantity != "phase"}
-    unknown = [own.unknown for own in (first, second) if own is not None and own.unknown]
-    if not units and not given and not unknown:
+    units = {
+        column.unit
+        for column in (first, second)
+        if column is not None and column.unit and column.unit.quantity != "phase"
+    }
+    unknown = [column.unknown for column in (first, second) if column is not None and column.unknown]
+    if not units and not text and not unknown:
         return None
     where = f"{table.path}: {first.header!r}: " if first.header else f"{table.path}: "
-    key = None if given is None else lab_unit(given)
-    own = next(iter(units), key)
-    if own is not None and own.decibels and not own.quantity and key is not None:
-        own = key
-    if len(units) > 1 or own is None or own.quantity not in QUANTITIES or (key is not None and own[1:] != key[1:]):
-        got = ", ".join([*(one.text for one in units), *unknown, *([] if given is None else [f"unit = {given!r}"])])
-        what = "decibels of what? E" if own is not None and own.decibels and not own.quantity else f"got {got}; e"
+    key = None if text is None else lab_unit(text)
+    unit = next(iter(units), key)
+    if unit is not None and unit.decibels and not unit.quantity and key is not None:
+        unit = key
+    if len(units) > 1 or unit is None or unit.quantity not in QUANTITIES or (key is not None and unit[1:] != key[1:]):
+        got = ", ".join([*(item.text for item in units), *unknown, *([] if text is None else [f"unit = {text!r}"])])
+        start = "decibels of what? E" if unit is not None and unit.decibels and not unit.quantity else f"got {got}; e"
         raise table.error(
-            f"{where}{what}xpected one unit per force, such as g/N, (m/s^2)/N, mm/N, dB re 1 m/N, there or by unit"
+            f"{where}{start}xpected one unit per force, such as g/N, (m/s^2)/N, mm/N, dB re 1 m/N, there or by unit"
         )
-    return own
+    return unit
 
 
 def _part(column: Column) -> str:
@@ -264,16 +275,16 @@ def _label(column: Column) -> str:
 def check_phase(path: object, error: type[VanedampError], values: np.ndarray, conjugate: bool) -> None:
     """Raise `error` if the phase of responses (k, n) at ascending frequencies rises where they are large.
 
-    Every stable pole turns the phase of exp(iwt) down by about half a turn: they are those of exp(-iwt), or have been
-    conjugated without need.
+    With exp(iwt), every stable pole lowers the phase by about half a turn: otherwise the phases are of exp(-iwt), or
+    were conjugated without need.
     """
     steps = values[:, 1:] * values[:, :-1].conj()
-    turns = np.abs(steps) * np.angle(steps)
-    if np.sum(turns) > _RISES * np.sum(np.abs(turns)):
-        sign, way, other = ("", "falls", "false") if conjugate else ("-", "rises", "true")
+    weighted = np.abs(steps) * np.angle(steps)
+    if np.sum(weighted) > _RISES * np.sum(np.abs(weighted)):
+        sign, trend, remedy = ("", "falls", "false") if conjugate else ("-", "rises", "true")
         raise error(
-            f"{path}: conjugate: looks like exp({sign}iwt): the phase {way} through the resonance; give conjugate = "
-            f"{other}"
+            f"{path}: conjugate: looks like exp({sign}iwt): the phase {trend} through the resonance; give conjugate = "
+            f"{remedy}"
         )
 
 
@@ -283,7 +294,10 @@ def write_frf(frf: Frf, path: str | os.PathLike[str]) -> None:
     if target.suffix.lower() in _UNIVERSAL:
         _frf_to_universal(frf, target)
         return
-    columns = [frf.frequencies_hz, *(part for response in frf.values for part in (response.real, response.imag))]
+    columns = [
+        frf.frequencies_hz,
+        *(part for response in frf.values for part in (response.real, response.imag)),
+    ]
     names = ["frequency_hz", *(f"{part}_{i}" for i in range(len(frf.values)) for part in ("real", "imag"))]
     write_csv(target, names, np.column_stack(columns).tolist())
 
@@ -334,26 +348,26 @@ def _of(file: Path) -> Iterator[None]:
 
 
 def _shapes_of_universal(file: Path) -> MeasuredShapes:
-    found = datasets(file)
+    content = datasets(file)
     nodes: dict[int, tuple[np.ndarray, int]] = {}  # coordinates, and the system of the displacements
-    known = systems(file)
+    frames = systems(file)
 
-    def frame(system: int) -> Frame:
-        return frame_of(system, lambda why: MeasurementError(f"{file}: {why}"), known)
+    def frame(system: int) -> CoordinateSystem:
+        return frame_of(system, lambda why: MeasurementError(f"{file}: {why}"), frames)
 
-    for dataset in found:
+    for dataset in content:
         if dataset["type"] in (15, 2411):
             points = np.column_stack([dataset["x"], dataset["y"], dataset["z"]])
-            labels, given, own = (
+            labels, defining, displaced = (
                 np.asarray(dataset[key], dtype=int).tolist() for key in ("node_nums", "def_cs", "disp_cs")
             )
-            for label, system in zip(labels, given, strict=True):
+            for label, system in zip(labels, defining, strict=True):
                 if not frame(system).is_global:
                     raise MeasurementError(
                         f"{file}: node {label} is given in coordinate system {system}; write global coordinates"
                     )
-            nodes |= dict(zip(labels, zip(points, own, strict=True), strict=True))
-    modes = [d for d in found if d["type"] == 55 and d["analysis_type"] in (NORMAL_MODE, COMPLEX_MODE)]
+            nodes |= dict(zip(labels, zip(points, displaced, strict=True), strict=True))
+    modes = [d for d in content if d["type"] == 55 and d["analysis_type"] in (NORMAL_MODE, COMPLEX_MODE)]
     if not nodes or not modes:
         raise MeasurementError(f"{file}: holds no nodes (dataset 15 or 2411) or no mode shapes (dataset 55)")
     numbers = np.asarray(modes[0]["node_nums"], dtype=int)
@@ -405,34 +419,37 @@ def _shapes_to_universal(shapes: MeasuredShapes, target: Path) -> None:
     write_universal(sets, target)
 
 
-def _frf_of_universal(file: Path, given: str | None) -> tuple[np.ndarray, list[_Response], str]:
+def _frf_of_universal(file: Path, unit: str | None) -> tuple[np.ndarray, list[_Response], str]:
     """Return frequencies (n,) Hz, responses, and how they were read."""
-    found = [d for d in datasets(file) if d["type"] == 58 and d["func_type"] == FRF]
-    if not found:
+    records = [d for d in datasets(file) if d["type"] == 58 and d["func_type"] == FRF]
+    if not records:
         raise MeasurementError(f"{file}: holds no frequency response (dataset 58, function type {FRF})")
-    frequencies = np.asarray(found[0]["x"], dtype=float)
+    frequencies = np.asarray(records[0]["x"], dtype=float)
     responses = list[_Response]()
-    for dataset in found:
+    for dataset in records:
         if not np.array_equal(np.asarray(dataset["x"], dtype=float), frequencies):
             raise MeasurementError(f"{file}: the responses have different frequencies; export them over one axis")
         label = f"{dataset['rsp_node']}:{dataset['rsp_dir']}/{dataset['ref_node']}:{dataset['ref_dir']}"
-        of = _universal_unit(file, dataset, given)
+        of = _universal_unit(file, dataset, unit)
         responses.append(_Response(label, of.factor * np.asarray(dataset["data"]), of))
     return (
         frequencies,
         responses,
-        f"{file}: universal file; in {', '.join(dict.fromkeys(own.of.text for own in responses if own.of))}",
+        f"{file}: universal file; in "
+        f"{', '.join(dict.fromkeys(response.of.text for response in responses if response.of))}",
     )
 
 
-def _universal_unit(file: Path, dataset: Mapping[str, Any], given: str | None) -> Unit:
+def _universal_unit(file: Path, dataset: Mapping[str, Any], unit: str | None) -> LabUnit:
     """Return the unit of dataset 58: as given, by the labels of its axes, or by its data type in SI."""
     top, below = (str(dataset.get(f"{axis}_axis_units_lab", "")).strip() for axis in ("ordinate", "orddenom"))
     top, below = (text if re.search(r"[A-Za-z]", text) and text.upper() != "NONE" else "" for text in (top, below))
     kind = _QUANTITIES.get(int(dataset["ordinate_spec_data_type"]))
-    label = f"({top})/({below})" if below and (alone := lab_unit(top)) and alone.quantity not in QUANTITIES else top
-    of = lab_unit(given or label or (UNITS[kind] if kind else ""))
-    if of is None or of.quantity not in QUANTITIES or (not given and kind not in (None, of.quantity)):
+    label = (
+        f"({top})/({below})" if below and (numerator := lab_unit(top)) and numerator.quantity not in QUANTITIES else top
+    )
+    of = lab_unit(unit or label or (UNITS[kind] if kind else ""))
+    if of is None or of.quantity not in QUANTITIES or (not unit and kind not in (None, of.quantity)):
         raise MeasurementError(
             f"{file}: unit {label or 'missing'!r} of data type {dataset['ordinate_spec_data_type']}: expected "
             "displacement (8), velocity (11) or acceleration (12) per force; give unit, such as g/N"

@@ -149,8 +149,8 @@ def _grouped(
     groups[1], groups[0] = _lower_groups(source, edges, faces, facets)
     entities = {3: source.cells, 2: surface, 1: edges, 0: np.arange(len(source.points))[:, None]}
     for name in sorted((facets or ()) & source.node_sets.keys()):
-        held = [entities[d][groups[d][name]].ravel() for d in (2, 1, 0) if name in groups[d]]
-        lost = np.setdiff1d(np.intersect1d(source.node_sets[name], source.cells), np.concatenate(held))
+        nodes = [entities[d][groups[d][name]].ravel() for d in (2, 1, 0) if name in groups[d]]
+        lost = np.setdiff1d(np.intersect1d(source.node_sets[name], source.cells), np.concatenate(nodes))
         if lost.size:
             raise MeshError(
                 f"{source.path}: node {source.nodes[lost[0]]} of the set {name!r} lies on an edge whose other nodes "
@@ -167,9 +167,9 @@ def _source(path: Path, mesh: LabelledMesh, skins: Collection[str]) -> _Source:
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
         raise MeshError(f"{path}: the coordinates of node {list(mesh.nodes)[bad[0]]} are not finite")
-    place = dict(zip(mesh.nodes, range(len(mesh.nodes)), strict=True))
+    index_of = dict(zip(mesh.nodes, range(len(mesh.nodes)), strict=True))
     for label, (_, nodes) in mesh.elements.items():
-        missing = [node for node in nodes if node not in place]
+        missing = [node for node in nodes if node not in index_of]
         if missing:
             raise MeshError(f"{path}: element {label}: there is no node {missing[0]}")
     named = {label for name in skins for label in mesh.element_sets.get(name, ())}
@@ -180,7 +180,7 @@ def _source(path: Path, mesh: LabelledMesh, skins: Collection[str]) -> _Source:
             f"{mesh.stiff[stiff]}, which are not imported; mesh it as a solid, or remove it; where it is only a skin, "
             "name its set as a support or an interface"
         )
-    shape, cells, order = _cells(path, mesh, place)
+    shape, cells, order = _cells(path, mesh, index_of)
     if len(shape.edges[0]) == 3 and shape.corners == 8:
         shape, cells, points = _bricks(points, cells)
     return _Source(
@@ -191,21 +191,21 @@ def _source(path: Path, mesh: LabelledMesh, skins: Collection[str]) -> _Source:
         labels=np.array(list(order)),
         nodes=list(mesh.nodes),
         cell_sets=_indexed(mesh.element_sets, order),
-        covers=_covers(mesh, place),
-        node_sets=_indexed(mesh.node_sets, place),
+        covers=_covers(mesh, index_of),
+        node_sets=_indexed(mesh.node_sets, index_of),
         absent=_absent(mesh),
     )
 
 
-def _cells(path: Path, mesh: LabelledMesh, place: dict[int, int]) -> tuple[_Shape, np.ndarray, dict[int, int]]:
+def _cells(path: Path, mesh: LabelledMesh, index_of: dict[int, int]) -> tuple[_Shape, np.ndarray, dict[int, int]]:
     """Return the shape of the volume elements, the indices of their nodes, and the index of each by its label."""
     volumes = {label: kind for label, (kind, _) in mesh.elements.items() if KINDS.get(kind, (3, 0))[0] == 3}
     solids = set(volumes.values())
     if len(solids) != 1 or not solids <= set(_SHAPES):
-        found = ", ".join(sorted(solids)) or "none"
-        raise MeshError(f"{path}: volume elements: {found}; expected one kind, tetrahedra or hexahedra")
+        listed = ", ".join(sorted(solids)) or "none"
+        raise MeshError(f"{path}: volume elements: {listed}; expected one kind, tetrahedra or hexahedra")
     shape = _SHAPES[solids.pop()]
-    cells = np.array([[place[node] for node in mesh.elements[label][1]] for label in volumes])
+    cells = np.array([[index_of[node] for node in mesh.elements[label][1]] for label in volumes])
     pair = same_rows(np.sort(cells[:, : shape.corners], axis=1))
     if pair is not None:
         first, second = (list(volumes)[index] for index in pair)
@@ -217,18 +217,18 @@ def _bricks(points: np.ndarray, cells: np.ndarray) -> tuple[_Shape, np.ndarray, 
     """Return shape, cells and points of bricks with 20 or 27 nodes, where curved with 27.
 
     The nodes that a 20-node brick lacks are put where its own shape functions have them: the shape stays the same, and
-    a dolfinx geometry knows no 20-node brick.
+    dolfinx has no geometry with 20-node bricks.
     """
-    places = points[cells]
-    corners, middles = places[:, :8], places[:, 8:20]
+    positions = points[cells]
+    corners, middles = positions[:, :8], positions[:, 8:20]
     pairs = np.array(_BRICK27.edges)[:, :2]
     off = [middles - corners[:, pairs].mean(axis=2)]
     # in the order of the nodes 20 to 25
     faces = np.array(sorted(_BRICK27.facets, key=lambda facet: facet[8]))
-    centres = 0.5 * places[:, faces[:, 4:8]].sum(axis=2) - 0.25 * places[:, faces[:, :4]].sum(axis=2)
+    centres = 0.5 * positions[:, faces[:, 4:8]].sum(axis=2) - 0.25 * positions[:, faces[:, :4]].sum(axis=2)
     inner = 0.25 * (middles.sum(axis=1) - corners.sum(axis=1))
     if cells.shape[1] == 27:
-        off.append(places[:, 20:] - np.concatenate([centres, inner[:, None]], axis=1))
+        off.append(positions[:, 20:] - np.concatenate([centres, inner[:, None]], axis=1))
     sizes = np.ptp(corners, axis=1).max(axis=1)
     if np.all(np.linalg.norm(np.concatenate(off, axis=1), axis=2).max(axis=1) <= _CURVED * sizes):
         return _BRICK20, cells[:, :20], points
@@ -245,14 +245,14 @@ def _bricks(points: np.ndarray, cells: np.ndarray) -> tuple[_Shape, np.ndarray, 
 def _absent(mesh: LabelledMesh) -> dict[str, str]:
     """Return the sets with members that do not exist: the first of these, "node 7", by the set's name."""
     absent: dict[str, str] = {}
-    for what, known, sets in (("node", mesh.nodes, mesh.node_sets), ("element", mesh.elements, mesh.element_sets)):
+    for kind, labels, sets in (("node", mesh.nodes, mesh.node_sets), ("element", mesh.elements, mesh.element_sets)):
         for name, members in sets.items():
-            lost = [label for label in members if label not in known]
-            absent |= {name: f"{what} {lost[0]}"} if lost else {}
+            lost = [label for label in members if label not in labels]
+            absent |= {name: f"{kind} {lost[0]}"} if lost else {}
     return absent
 
 
-def _covers(mesh: LabelledMesh, place: dict[int, int]) -> dict[int, dict[str, set[tuple[int, ...]]]]:
+def _covers(mesh: LabelledMesh, index_of: dict[int, int]) -> dict[int, dict[str, set[tuple[int, ...]]]]:
     """Return the corners of the points, lines and shells in each set, by dimension and name."""
     covers: dict[int, dict[str, set[tuple[int, ...]]]] = {0: {}, 1: {}, 2: {}}
     for name, members in mesh.element_sets.items():
@@ -260,24 +260,24 @@ def _covers(mesh: LabelledMesh, place: dict[int, int]) -> dict[int, dict[str, se
             element, nodes = mesh.elements.get(label, ("", []))
             dimension, corners = KINDS.get(element, (3, 0))
             if dimension < 3:
-                key = tuple(sorted(place[node] for node in nodes[:corners]))
+                key = tuple(sorted(index_of[node] for node in nodes[:corners]))
                 covers[dimension].setdefault(name, set()).add(key)
     for name, faces in mesh.face_sets.items():
-        covers[2].setdefault(name, set()).update(tuple(sorted(place[node] for node in face)) for face in faces)
+        covers[2].setdefault(name, set()).update(tuple(sorted(index_of[node] for node in face)) for face in faces)
     return covers
 
 
-def _indexed(sets: dict[str, list[int]], place: dict[int, int]) -> dict[str, np.ndarray]:
+def _indexed(sets: dict[str, list[int]], index_of: dict[int, int]) -> dict[str, np.ndarray]:
     """Return the sets with members that are there, as sorted indices."""
-    return _kept(
+    return _nonempty(
         {
-            name: np.unique(np.array([place[label] for label in labels if label in place], dtype=int))
+            name: np.unique(np.array([index_of[label] for label in labels if label in index_of], dtype=int))
             for name, labels in sets.items()
         }
     )
 
 
-def _kept(sets: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _nonempty(sets: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {name: members for name, members in sets.items() if members.size}
 
 
@@ -307,7 +307,7 @@ def _facet_groups(source: _Source, surface: np.ndarray, wanted: Collection[str] 
                 f"{source.path}: {len(faces) - covered.size} of the {len(faces)} faces of {name!r} are no outer facets "
                 "of the volume elements; take them out of the set"
             )
-        groups[name] = np.unique(covered)  # which says more than a node set of that name
+        groups[name] = np.unique(covered)  # more precise than a node set of that name
     lower = {name: np.empty(0, dtype=int) for dimension in (0, 1) for name in source.covers[dimension]}
     return _wanted(source, lower | groups, wanted, "set or surface")
 
@@ -341,7 +341,7 @@ def _edges(source: _Source) -> np.ndarray:
 def _lower_groups(
     source: _Source, edges: np.ndarray, facets: dict[str, np.ndarray], wanted: Collection[str] | None
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return what sets hold besides their facets (n, k): name -> indices of edges, name -> corners of elements."""
+    """Return the entities of sets outside their facets (n, k): name -> indices of edges, name -> element corners."""
     corners = np.unique(source.cells[:, : source.shape.corners])
     keys = {key: index for index, key in enumerate(_keys(edges, 2))}
     lines: dict[str, np.ndarray] = {}
@@ -356,18 +356,18 @@ def _lower_groups(
         outside = np.ones(len(source.points), dtype=bool)
         faces = facets.get(name, np.empty((0, 1), dtype=int))
         outside[faces] = False
-        given = [keys[pair] for pair in pairs if pair in keys]
+        indices = [keys[pair] for pair in pairs if pair in keys]
         beyond = np.flatnonzero(inside[edges].all(axis=1) & outside[edges].any(axis=1))
-        lines[name] = np.union1d(beyond, np.array(given, dtype=int))
+        lines[name] = np.union1d(beyond, np.array(indices, dtype=int))
         inside[[node for (node,) in single]] = True
         points[name] = corners[(inside & outside)[corners]]
         if wanted is None:
             continue
-        if len(given) < len(pairs):
+        if len(indices) < len(pairs):
             raise MeshError(f"{source.path}: the set {name!r} holds a line that is no edge of a volume element")
         if not points[name].size and not lines[name].size and not faces.size:
             raise MeshError(f"{source.path}: the set {name!r} holds no corner of a volume element")
-    return _kept(lines), _kept(points)
+    return _nonempty(lines), _nonempty(points)
 
 
 def _wanted(
@@ -378,16 +378,16 @@ def _wanted(
             raise MeshError(f"{source.path}: no {kind} {name!r}; there are: {', '.join(sorted(groups)) or 'none'}")
         if name in source.absent:
             raise MeshError(f"{source.path}: the set {name!r} names {source.absent[name]}, which is not in the mesh")
-    taken = groups.keys() - source.absent.keys() if wanted is None else wanted
-    return _kept({name: groups[name] for name in groups if name in taken})
+    names = groups.keys() - source.absent.keys() if wanted is None else wanted
+    return _nonempty({name: groups[name] for name in groups if name in names})
 
 
 def _check_disjoint(path: Path, groups: dict[int, dict[str, np.ndarray]]) -> None:
-    for dimension, what in ((2, "facet"), (3, "volume")):
+    for dimension, kind in ((2, "facet"), (3, "volume")):
         pair = msh.overlap(groups[dimension])
         if pair is not None:
             raise MeshError(
-                f"{path}: the sets {pair[0]!r} and {pair[1]!r} share {pair[2]} {what} elements; take one of them, or "
+                f"{path}: the sets {pair[0]!r} and {pair[1]!r} share {pair[2]} {kind} elements; take one of them, or "
                 "make them disjoint: an element carries one label"
             )
 
@@ -399,11 +399,11 @@ def _fill_model(
 
     Raises MeshError for folded cells, by their labels.
     """
-    rest = np.setdiff1d(np.arange(len(source.cells)), np.concatenate([np.empty(0, int), *groups[3].values()]))
+    ungrouped = np.setdiff1d(np.arange(len(source.cells)), np.concatenate([np.empty(0, int), *groups[3].values()]))
     used = np.unique(source.cells[:, source.shape.order])
     number = np.zeros(len(source.points), dtype=int)
     number[used] = np.arange(1, used.size + 1)
-    volumes = groups[3] | ({"": rest} if rest.size else {})
+    volumes = groups[3] | ({"": ungrouped} if ungrouped.size else {})
     for dimension, named in ((3, volumes), *((lower, groups[lower]) for lower in (2, 1, 0))):
         kind = source.shape.elements[dimension]
         width = gmsh.model.mesh.getElementProperties(kind)[3]

@@ -1,4 +1,4 @@
-"""Which mode is which from speed to speed: by the MAC of neighbours, and speeds put in where that is ambiguous.
+"""Modes tracked from speed to speed, by the MAC of neighbours, with further speeds where this is ambiguous.
 
 Two modes whose frequencies approach each other either cross, each keeping its shape, or veer: they turn away from each
 other and exchange their shapes on the way (Leissa 1974; Perkins and Mote 1986, J. Sound Vib. 106). Between coarse
@@ -18,7 +18,7 @@ from vanedamp.modal.speed_range import SpeedModes, SpeedRange
 
 #: MAC of one mode at neighbouring speeds, at least
 CLEAR_MAC = 0.9
-#: least fraction of its shape that a mode takes over from another one for a veering
+#: least fraction of its shape that a mode takes over from another mode in a veering
 LEAST_EXCHANGE = 0.25
 #: speeds closer than this fraction of the range are no longer divided
 _CLOSEST = 1e-8
@@ -40,7 +40,7 @@ class Tracks:
         self._least = _CLOSEST * float(speeds[-1] - speeds[0])
         self.notes: list[str] = []
         first = source.modes(float(speeds[0]))
-        # its multiple modes stand as they part
+        # its multiple modes are oriented as they separate
         self.states = [self._aligned(first, source.modes(float(speeds[0]) + 100.0 * self._least))]
         self.number = [np.arange(first.frequencies.size)]
         for speed in speeds[1:]:
@@ -58,33 +58,33 @@ class Tracks:
 
     def frequencies(self, mode: int) -> np.ndarray:
         """Return the frequencies (s,) of a mode, rad/s; nan where it is not among the modes of the source."""
-        found = (state.frequencies[number == mode] for state, number in zip(self.states, self.number, strict=True))
-        return np.array([frequency[0] if frequency.size else np.nan for frequency in found])
+        per_speed = (state.frequencies[number == mode] for state, number in zip(self.states, self.number, strict=True))
+        return np.array([frequency[0] if frequency.size else np.nan for frequency in per_speed])
 
-    def number_at(self, speed: float, place: int) -> int:
-        """Return the mode that is the place-th lowest at a speed of the range, by its shapes at the neighbours."""
+    def number_at(self, speed: float, index: int) -> int:
+        """Return the mode that is the index-th lowest at a speed of the range, by its shapes at the neighbours."""
         right = min(max(int(np.searchsorted(self.speeds, speed)), 1), len(self.states) - 1)
         modes = self._aligned(self.source.modes(speed), self.states[right - 1])
         alike = np.zeros(1 + max(number.max() for number in self.number))
         for j in (right - 1, right):
-            alike[self.number[j]] += modal_assurance(modes.shapes[:, place : place + 1].T, self.states[j].shapes.T)[0]
+            alike[self.number[j]] += modal_assurance(modes.shapes[:, index : index + 1].T, self.states[j].shapes.T)[0]
         return int(np.argmax(alike))
 
     def approaches(self) -> list[Approach]:
         """Return all crossings and veerings of the modes that are kept, by their speed."""
-        found = []
+        approaches = []
         for interval, (left, right) in enumerate(itertools.pairwise(self.states)):
-            for place in range(left.frequencies.size - 1):
-                met = self._closest(place, left, right)
+            for index in range(left.frequencies.size - 1):
+                met = self._closest(index, left, right)
                 if met is not None:
-                    found.append(self._approach(interval, place, met))
-        kept = [
+                    approaches.append(self._approach(interval, index, met))
+        followed = [
             approach
-            for approach in found
+            for approach in approaches
             if (approach.kind == "crossing" or approach.exchange >= LEAST_EXCHANGE)
             and np.isin([approach.first, approach.second], self.kept).any()
         ]
-        return sorted(kept, key=lambda approach: approach.speed)
+        return sorted(followed, key=lambda approach: approach.speed)
 
     def _reach(self, speed: float) -> None:
         """Continue from the last state to a speed, over speeds between them as far as the shapes need."""
@@ -101,15 +101,15 @@ class Tracks:
             number = np.full(right.frequencies.size, -1)
             number[pairs.second] = self.number[-1][pairs.first]
             unknown = np.flatnonzero(number < 0)
-            number[unknown] = 1 + max(known.max() for known in self.number) + np.arange(unknown.size)
+            number[unknown] = 1 + max(numbers.max() for numbers in self.number) + np.arange(unknown.size)
             self.states.append(right)
             self.number.append(number)
 
     def _between(self, left: SpeedModes, right: SpeedModes, pairs: Pairing) -> float | None:
-        """Return a speed that has to come between two; None where the pairs are clear."""
+        """Return a speed needed between two; None where the pairs are clear."""
         # the highest may be crossed by one that is not computed
-        known = np.arange(left.frequencies.size - (not self.source.whole))
-        clear = np.isin(known, pairs.first).all() and np.isin(known, pairs.second).all()
+        complete = np.arange(left.frequencies.size - (not self.source.whole))
+        clear = np.isin(complete, pairs.first).all() and np.isin(complete, pairs.second).all()
         moved = pairs.first != pairs.second
         if clear and not moved.any():
             return None
@@ -119,48 +119,48 @@ class Tracks:
                 self.notes.append(f"modes cannot be followed over {high:.9g} rad/s: their shapes jump there")
             return None
         swapped = {(int(a), int(b)) for a, b in zip(pairs.first[moved], pairs.second[moved], strict=True)}
-        for place in sorted({min(pair) for pair in swapped}):
-            met = self._closest(place, left, right) if (place, place + 1) in swapped else None
-            if met is not None and low < met.speed < high and not self._one(met, place):
+        for index in sorted({min(pair) for pair in swapped}):
+            met = self._closest(index, left, right) if (index, index + 1) in swapped else None
+            if met is not None and low < met.speed < high and not self._coincide(met, index):
                 return met.speed  # a veering so narrow that the shapes seem to go straight on
-            if met is not None and (place + 1, place) in swapped:
-                swapped -= {(place, place + 1), (place + 1, place)}
+            if met is not None and (index + 1, index) in swapped:
+                swapped -= {(index, index + 1), (index + 1, index)}
         return None if clear and not swapped else 0.5 * (low + high)
 
-    def _closest(self, place: int, left: SpeedModes, right: SpeedModes) -> SpeedModes | None:
-        """Return the modes where the place-th and the next frequency are closest between two speeds.
+    def _closest(self, index: int, left: SpeedModes, right: SpeedModes) -> SpeedModes | None:
+        """Return the modes where the index-th and the next frequency are closest between two speeds.
 
         None where they do not come closer there, or are one frequency all along.
         """
-        if right.frequencies.size <= place + 1 or (self._one(left, place) and self._one(right, place)):
+        if right.frequencies.size <= index + 1 or (self._coincide(left, index) and self._coincide(right, index)):
             return None
 
-        def parting(speed: float, known: SpeedModes | None = None) -> float:
-            slopes = self.source.slopes(self.source.modes(speed) if known is None else known)
-            return float(slopes[place + 1] - slopes[place])
+        def parting(speed: float, modes: SpeedModes | None = None) -> float:
+            slopes = self.source.slopes(self.source.modes(speed) if modes is None else modes)
+            return float(slopes[index + 1] - slopes[index])
 
         if not (parting(left.speed, left) < 0.0 <= parting(right.speed, right)):
             return None
         low, high = left.speed, right.speed
         if parting(low) < 0.0 <= parting(high):  # at one frequency, the shapes may be mixed otherwise than in the state
             low = optimize.brentq(parting, low, high, xtol=1e-14 * high, rtol=1e-14)
-        elif self._one(right, place):
+        elif self._coincide(right, index):
             low = high
         return self.source.modes(low)
 
-    def _one(self, modes: SpeedModes, place: int) -> bool:
-        """Say whether the place-th and the next frequency are one."""
-        low, high = modes.frequencies[place : place + 2]
+    def _coincide(self, modes: SpeedModes, index: int) -> bool:
+        """Whether the index-th and the next frequency coincide."""
+        low, high = modes.frequencies[index : index + 2]
         return bool(high - low <= self.same * high)
 
-    def _approach(self, interval: int, place: int, met: SpeedModes) -> Approach:
-        """Return the approach of the place-th and the next mode in an interval of the speeds."""
-        low, high = (float(omega) / (2.0 * np.pi) for omega in met.frequencies[place : place + 2])
-        first, second = self.number[interval][place : place + 2].tolist()
-        if [second, first] == self.number[interval + 1][place : place + 2].tolist():
+    def _approach(self, interval: int, index: int, met: SpeedModes) -> Approach:
+        """Return the approach of the index-th and the next mode in an interval of the speeds."""
+        low, high = (float(omega) / (2.0 * np.pi) for omega in met.frequencies[index : index + 2])
+        first, second = self.number[interval][index : index + 2].tolist()
+        if [second, first] == self.number[interval + 1][index : index + 2].tolist():
             return Approach("crossing", first, second, met.speed, 0.5 * (low + high), 0.0, 0.0)
         # a third mode may cross one of them on the way
-        first, second = (self.number_at(met.speed, at) for at in (place, place + 1))
+        first, second = (self.number_at(met.speed, at) for at in (index, index + 1))
         exchange = self._exchange(first, second, interval)
         return Approach("veering", first, second, met.speed, 0.5 * (low + high), high - low, exchange)
 
@@ -189,8 +189,8 @@ class Tracks:
             if group.size > 1:
                 overlap = shapes[:, group].conj().T @ reference.shapes
                 nearest = np.sort(np.argsort(-np.linalg.norm(overlap, axis=0))[: group.size])
-                turn, _ = linalg.polar(overlap[:, nearest])  # the nearest rotation (Procrustes)
-                shapes[:, group] = shapes[:, group] @ turn
+                rotation, _ = linalg.polar(overlap[:, nearest])  # the nearest rotation (Procrustes)
+                shapes[:, group] = shapes[:, group] @ rotation
         return modes._replace(shapes=shapes)
 
 

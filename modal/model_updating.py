@@ -27,18 +27,18 @@ from vanedamp.modal.records.modes import Modes
 LIMIT = 0.02
 #: relative error of the measured frequencies for which deviations of the factors are given
 FREQUENCY_ERROR = 1e-3
-#: relative misses of a tuned frequency: up to the first measurements scatter, from the second on a warning, beyond the
-#: third the modes are not the measured ones
+#: relative errors of a tuned frequency: scatter of measurements up to the first, a warning above the second, wrong
+#: modes above the third
 _SCATTER, _DOUBTFUL, _MISSED = FREQUENCY_ERROR, 0.01, 0.05
-#: of the sum of squared misses, or of the logarithms of factors: another pairing with less than this is better
+#: another pairing is better below this fraction of the sum of squared errors, or of squared logarithms of factors
 _BETTER = 0.1
-#: pairings that are tried in place of one that misses the frequencies
+#: number of other pairings tried if the frequencies are not met
 _PAIRINGS = 4
-# further modes that are computed, so that one that moves up is not lost
+# further modes that are computed, so that a rising mode is not lost
 _SPARE = 4
-#: part of the stiffness below which the rest is round-off of the assembly
+#: fraction of the stiffness that may be round-off of the assembly
 _ROUND_OFF = 1e-12
-# of the largest singular value of the sensitivities: below it two factors do the same to all frequencies
+# relative to the largest singular value of the sensitivities: below it, two factors have the same effect
 _ALIKE = 1e-6
 
 
@@ -89,7 +89,7 @@ def sensitivities(
     """
     chosen = np.arange(len(modes)) if indices is None else np.asarray(indices)
     shapes, eigenvalues = modes.shapes[chosen], modes.angular_frequencies[chosen] ** 2
-    energies = [np.einsum("ij,ij->i", shapes, shapes @ part) for part in parts.values()]
+    energies = [np.einsum("ij,ij->i", shapes, shapes @ matrix) for matrix in parts.values()]
     return np.column_stack(energies) / (2.0 * eigenvalues[:, None])
 
 
@@ -128,26 +128,26 @@ def tune(
     problem.check_pairs(before)
     _check_rank(before.jacobian, problem)
     bound = -np.log(LIMIT)
-    found = _fit(problem, start, bound)
+    fit = _fit(problem, start, bound)
     for point in np.random.default_rng(0).uniform(-np.log(2.0), np.log(2.0), (starts - 1, start.size)):
         problem.follow_from_start()
-        other = _fit(problem, point, bound)
-        found = other if other.cost < found.cost else found
+        candidate = _fit(problem, point, bound)
+        fit = candidate if candidate.cost < fit.cost else fit
     problem.follow_from_start()
-    after = problem.at(found.x)
+    after = problem.at(fit.x)
     problem.check_pairs(after)
-    stuck = np.flatnonzero(np.abs(found.x) > 0.999 * bound)
+    stuck = np.flatnonzero(np.abs(fit.x) > 0.999 * bound)
     if stuck.size:
         name = list(problem.parts)[stuck[0]]
         raise TuningError(
-            f"{name}: its factor runs to {np.exp(found.x[stuck[0]]):.3g} and the frequencies still do not meet "
+            f"{name}: its factor runs to {np.exp(fit.x[stuck[0]]):.3g} and the frequencies still do not meet "
             f"{problem.target.tolist()} Hz; check which modes these belong to, and vary another part"
         )
-    warnings = _doubts(problem, before, after, found)
+    warnings = _doubts(problem, before, after, fit)
     spread = np.linalg.pinv(after.jacobian)
     return Tuning(
         names=tuple(problem.parts),
-        factors=frozen(np.exp(found.x)),
+        factors=frozen(np.exp(fit.x)),
         deviations=frozen(FREQUENCY_ERROR * np.linalg.norm(spread, axis=1)),
         target_hz=frozen(problem.target),
         before_hz=frozen(before.frequencies),
@@ -158,21 +158,21 @@ def tune(
         mac_after=frozen(after.mac),
         sensitivities=frozen(after.jacobian),
         evaluations=problem.evaluations,
-        matrices=problem.system(found.x),
+        matrices=problem.system(fit.x),
         warnings=warnings,
     )
 
 
-def _doubts(problem: _Problem, before: _State, after: _State, found: Any) -> tuple[str, ...]:
+def _doubts(problem: _Problem, before: _State, after: _State, search: Any) -> tuple[str, ...]:
     """Return warnings about the pairing of a search's result. Raises TuningError for one that cannot be right."""
     miss = float(np.abs(np.expm1(after.residual)).max())
-    other = None if problem.measured is not None else _other_pairing(problem, before, after, found, miss)
-    if other is not None:
-        meant, fit = other
+    alternative = None if problem.measured is not None else _other_pairing(problem, before, after, search, miss)
+    if alternative is not None:
+        meant, fit = alternative
         by = float(np.abs(np.expm1(fit.fun)).max())
         better = (
             f"modes: {meant.tolist()} meet the frequencies {_listed(problem.target)} Hz to {by:.2g} with factors "
-            f"{_listed(np.exp(fit.x))}, modes {problem.meant.tolist()} to {miss:.2g} with {_listed(np.exp(found.x))}; "
+            f"{_listed(np.exp(fit.x))}, modes {problem.meant.tolist()} to {miss:.2g} with {_listed(np.exp(search.x))}; "
             "say which modes they are, by `modes` or measured shapes"
         )
         if miss > _DOUBTFUL or problem.modes is None:
@@ -191,11 +191,11 @@ def _doubts(problem: _Problem, before: _State, after: _State, found: Any) -> tup
 
 
 def _other_pairing(
-    problem: _Problem, before: _State, after: _State, found: Any, miss: float
+    problem: _Problem, before: _State, after: _State, search: Any, miss: float
 ) -> tuple[np.ndarray, Any] | None:
     """Return other modes and the search for them, where they meet the frequencies far better or with far less change.
 
-    As many factors as frequencies may meet them with any modes: then the change of the factors tells.
+    With as many factors as frequencies, any modes may fit: then the change of the factors decides.
     """
     enough = len(problem.parts) == len(problem.target)
     if miss <= _SCATTER and not enough:
@@ -212,7 +212,7 @@ def _other_pairing(
             problem.matrices, problem.parts, problem.target, None, meant.tolist(), problem.least, problem.keep
         )
         trial.scaled_from(before)
-        fit = _fit(trial, np.zeros(found.x.size), -np.log(LIMIT))
+        fit = _fit(trial, np.zeros(search.x.size), -np.log(LIMIT))
         problem.evaluations += trial.evaluations
         waiting.append(trial.nearest(trial.at(fit.x).all_hz))
         if best is None or fit.cost < best[1].cost:
@@ -220,10 +220,10 @@ def _other_pairing(
     if best is None:
         return None
     meets = np.abs(np.expm1(best[1].fun)).max() <= _SCATTER
-    less_change = meets and best[1].x @ best[1].x < _BETTER * (found.x @ found.x)
+    less_change = meets and best[1].x @ best[1].x < _BETTER * (search.x @ search.x)
     if miss <= _SCATTER:
         return best if less_change else None
-    return best if best[1].cost < _BETTER * found.cost else None
+    return best if best[1].cost < _BETTER * search.cost else None
 
 
 def _listed(values: np.ndarray) -> str:
@@ -251,8 +251,8 @@ class _State:
     def scaled(self, factor: float, modes: np.ndarray, target: np.ndarray) -> _State:
         """Return the state of some modes (n,) with the whole stiffness times a factor; target (n,): Hz."""
         all_hz = self.all_hz * np.sqrt(factor)
-        whole, own = np.full((len(modes), 1), 0.5), np.array_equal(modes, self.indices)
-        mac = self.mac if own else np.ones(len(modes))
+        whole, unchanged = np.full((len(modes), 1), 0.5), np.array_equal(modes, self.indices)
+        mac = self.mac if unchanged else np.ones(len(modes))
         return _State(all_hz, all_hz[modes], modes, mac, np.log(all_hz[modes] / target), whole)
 
 
@@ -296,9 +296,9 @@ class _Problem:
         """Whether there is one factor, on the whole stiffness, up to round-off."""
         if len(self.parts) != 1:
             return False
-        [part] = self.parts.values()
-        rest = abs(self.matrices.stiffness - part)
-        return bool(rest.max() <= _ROUND_OFF * abs(part).max())
+        [matrix] = self.parts.values()
+        remainder = abs(self.matrices.stiffness - matrix)
+        return bool(remainder.max() <= _ROUND_OFF * abs(matrix).max())
 
     def scaled_from(self, untuned: _State) -> None:
         """Take the untuned state of other modes, where one factor scales all of them."""
@@ -308,8 +308,8 @@ class _Problem:
     def system(self, point: np.ndarray) -> SystemMatrices:
         """Return the matrices with these factors."""
         stiffness = self.matrices.stiffness
-        for factor, part in zip(np.exp(point), self.parts.values(), strict=True):
-            stiffness = stiffness + (factor - 1.0) * part
+        for factor, matrix in zip(np.exp(point), self.parts.values(), strict=True):
+            stiffness = stiffness + (factor - 1.0) * matrix
         return replace(self.matrices, stiffness=sparse.csr_array(stiffness))
 
     def at(self, point: np.ndarray) -> _State:
@@ -341,7 +341,7 @@ class _Problem:
         if self._first is not None:
             return self._first.scaled(float(np.exp(point[0])), self._first.indices, self.target)
         self.evaluations += 1
-        shapes: np.ndarray | None = None  # of an evaluation that was kept they are not known
+        shapes: np.ndarray | None = None  # not stored with earlier evaluations
 
         def solved() -> Arrays:
             nonlocal shapes
@@ -384,9 +384,9 @@ class _Problem:
                 f"parts: {len(self.parts)} factors ({', '.join(self.parts) or 'none'}) from {count} frequencies; "
                 "name at least one part, and at most as many as frequencies"
             )
-        for name, part in self.parts.items():
-            if part.shape != (size, size):
-                raise TuningError(f"{name}: shape {part.shape}, expected {(size, size)} as the stiffness")
+        for name, matrix in self.parts.items():
+            if matrix.shape != (size, size):
+                raise TuningError(f"{name}: shape {matrix.shape}, expected {(size, size)} as the stiffness")
         if self.measured is not None and len(self.measured) != count:
             raise TuningError(f"measured: {len(self.measured)} shapes for {count} target frequencies")
         if modes is not None and (len(set(modes)) != count or len(modes) != count or min(modes) < 0):

@@ -79,11 +79,11 @@ def merge(path: Path) -> None:
     complaints = [line for line in log if line.startswith("Error")]
     if complaints:
         raise MeshError(f"{path}: gmsh cannot read this mesh ({complaints[0]})")
-    counts = [found for found in (re.fullmatch(r"Info: (\d+) elements?", line) for line in log) if found]
+    counts = [match for match in (re.fullmatch(r"Info: (\d+) elements?", line) for line in log) if match]
     labels = gmsh.model.mesh.getElements()[1]
-    kept = np.unique(np.concatenate(labels)).size if labels else 0
-    if counts and kept < int(counts[-1][1]):
-        lost = int(counts[-1][1]) - kept
+    loaded = np.unique(np.concatenate(labels)).size if labels else 0
+    if counts and loaded < int(counts[-1][1]):
+        lost = int(counts[-1][1]) - loaded
         raise MeshError(f"{path}: {lost} element numbers are given twice, of which gmsh keeps one; renumber them")
 
 
@@ -113,16 +113,16 @@ def taken(dimension: int) -> dict[str, np.ndarray]:
 
     The groups are taken out of the current model: not every version of dolfinx reads a model that has them.
     """
-    found = {}
+    nodes_of = {}
     for name, tag in groups(dimension).items():
         entities = gmsh.model.getEntitiesForPhysicalGroup(dimension, tag)
         rows = [corners for entity in entities for _, _, corners in _elements(dimension, entity)]
-        found[name] = np.concatenate([np.empty((0, dimension + 1), dtype=np.int64), *rows])
-        if not found[name].size:
+        nodes_of[name] = np.concatenate([np.empty((0, dimension + 1), dtype=np.int64), *rows])
+        if not nodes_of[name].size:
             raise MeshError(f"group {name!r} of dimension {dimension} is empty; mesh it with the volumes")
-    if found:  # an empty list would remove every group
+    if nodes_of:  # an empty list would remove every group
         gmsh.model.removePhysicalGroups(gmsh.model.getPhysicalGroups(dimension))
-    return found
+    return nodes_of
 
 
 def drop_strays() -> None:
@@ -185,10 +185,10 @@ def check_twice() -> None:
 
 def same_rows(rows: np.ndarray) -> tuple[int, int] | None:
     """Return the indices of two equal rows of (n, k); None where all differ."""
-    _, place, counts = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
+    _, inverse, counts = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
     if counts.size == 0 or counts.max() == 1:
         return None
-    first, second = np.flatnonzero(place.ravel() == np.argmax(counts))[:2]
+    first, second = np.flatnonzero(inverse.ravel() == np.argmax(counts))[:2]
     return int(first), int(second)
 
 
@@ -263,13 +263,13 @@ def check_connected() -> None:
     elements = np.repeat(np.arange(names.size), np.concatenate(lengths))
     size = names.size + int(nodes.max()) + 1
     graph = sparse.coo_array((np.ones(nodes.size, np.int8), (elements, names.size + nodes)), shape=(size, size))
-    parts = csgraph.connected_components(graph, directed=False)[1][: names.size]
-    found, counts = np.unique(parts, return_counts=True)
-    if found.size > 1:
-        held = [sorted(set(names[parts == part])) for part in found[:4]]
-        listed = "; ".join(f"{', '.join(map(repr, g))} ({n} elements)" for g, n in zip(held, counts, strict=False))
+    component_of = csgraph.connected_components(graph, directed=False)[1][: names.size]
+    components, counts = np.unique(component_of, return_counts=True)
+    if components.size > 1:
+        groups = [sorted(set(names[component_of == component])) for component in components[:4]]
+        listed = "; ".join(f"{', '.join(map(repr, g))} ({n} elements)" for g, n in zip(groups, counts, strict=False))
         raise MeshError(
-            f"the mesh falls into {found.size} parts that share no node: {listed}; "
+            f"the mesh falls into {components.size} parts that share no node: {listed}; "
             "join their volumes (OCC's fragment), or merge coincident nodes"
         )
 
@@ -307,8 +307,8 @@ def _elements(dimension: int, entity: int = -1) -> Iterator[tuple[np.ndarray, np
 def _members(dimension: int, tag: int) -> np.ndarray:
     """Return the elements of a physical group as sorted corner nodes, each once: copies of an element are the same."""
     entities = gmsh.model.getEntitiesForPhysicalGroup(dimension, tag)
-    found = [corners for entity in entities for _, _, corners in _elements(dimension, entity)]
+    corner_rows = [corners for entity in entities for _, _, corners in _elements(dimension, entity)]
     # zeros, which are no node's number, fill up to the corners of a hexahedron
-    filled = [np.sort(np.pad(corners, ((0, 0), (0, 8 - corners.shape[1]))), axis=1) for corners in found]
+    filled = [np.sort(np.pad(corners, ((0, 0), (0, 8 - corners.shape[1]))), axis=1) for corners in corner_rows]
     rows = np.concatenate([np.empty((0, 8), np.int64), *filled])
     return np.unique(rows.view(np.dtype((np.void, 8 * rows.itemsize))))

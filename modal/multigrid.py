@@ -21,7 +21,7 @@ from vanedamp.modal.petsc import PETSc, Product, SolverError, factorize, owned
 
 # steps of the smoother, and the part of the spectrum, below the largest eigenvalue, that it is to damp
 _STEPS, _DAMPED = 3, 15.0
-# rounds of the power method for that eigenvalue, and what they may miss
+# rounds of the power method for that eigenvalue, and its possible error
 _ROUNDS, _SAFE = 15, 1.1
 _OPTIONS = {"pc_gamg_type": "agg", "pc_gamg_agg_nsmooths": 1, "pc_gamg_threshold": 0.01}
 _PREFIX = "vanedamp_mg_"
@@ -48,23 +48,23 @@ class VertexMultigrid:
 
     def __call__(self, rows: np.ndarray) -> np.ndarray:
         """Return one V-cycle applied to rows (k, n)."""
-        found = self._smoothed(rows)
-        found += self._up(self._coarse.solve_rows(self._down(rows - self._stiffness(found))))
-        found += self._smoothed(rows - self._stiffness(found))
-        return found
+        solution = self._smoothed(rows)
+        solution += self._up(self._coarse.solve_rows(self._down(rows - self._stiffness(solution))))
+        solution += self._smoothed(rows - self._stiffness(solution))
+        return solution
 
     def _smoothed(self, rows: np.ndarray) -> np.ndarray:
         """Return the Chebyshev iteration from zero (Saad 2003, Iterative Methods, algorithm 12.1), Jacobi's in it."""
         centre, half = 0.5 * self._largest * (1.0 + 1.0 / _DAMPED), 0.5 * self._largest * (1.0 - 1.0 / _DAMPED)
         step, ratio = self._inverse * rows / centre, half / centre
-        found = step.copy()
+        solution = step.copy()
         for _ in range(_STEPS - 1):
             rows = rows - self._stiffness(step)
             after = 1.0 / (2.0 * centre / half - ratio)
             step = after * ratio * step + 2.0 * after / half * (self._inverse * rows)
-            found += step
+            solution += step
             ratio = after
-        return found
+        return solution
 
 
 class Aggregation:
@@ -75,21 +75,21 @@ class Aggregation:
     rigid_motions  (6, 3 nodes) of these nodes, zero at DOFs that are fixed
     """
 
-    def __init__(self, stiffness: sparse.csr_array, places: np.ndarray, rigid_motions: np.ndarray) -> None:
-        self._places, size = places, rigid_motions.shape[1]
-        if places.size < size:  # GAMG wants whole nodes: the DOFs that are fixed stand alone
-            spread = sparse.csr_array((np.ones(places.size), (places, np.arange(places.size))), (size, places.size))
-            alone = np.full(size, stiffness.diagonal().mean())
-            alone[places] = 0.0
-            stiffness = sparse.csr_array(spread @ stiffness @ spread.T + sparse.diags(alone))
+    def __init__(self, stiffness: sparse.csr_array, dofs: np.ndarray, rigid_motions: np.ndarray) -> None:
+        self._dofs, size = dofs, rigid_motions.shape[1]
+        if dofs.size < size:  # GAMG requires all DOFs of a node: fixed DOFs are decoupled
+            spread = sparse.csr_array((np.ones(dofs.size), (dofs, np.arange(dofs.size))), (size, dofs.size))
+            diagonal = np.full(size, stiffness.diagonal().mean())
+            diagonal[dofs] = 0.0
+            stiffness = sparse.csr_array(spread @ stiffness @ spread.T + sparse.diags(diagonal))
         # PETSc reads them where they are
         pattern = (indices.astype(PETSc.IntType, copy=False) for indices in (stiffness.indptr, stiffness.indices))
-        self._kept = (*pattern, stiffness.data)
+        self._arrays = (*pattern, stiffness.data)
         basis = np.linalg.qr(rigid_motions.T)[0].T.copy()
         with contextlib.ExitStack() as stack:
             vectors = [stack.enter_context(owned(_vector(row))) for row in basis]
             near = stack.enter_context(owned(PETSc.NullSpace().create(vectors=vectors, comm=PETSc.COMM_SELF)))
-            self._matrix = PETSc.Mat().createAIJWithArrays((size, size), self._kept, bsize=3, comm=PETSc.COMM_SELF)
+            self._matrix = PETSc.Mat().createAIJWithArrays((size, size), self._arrays, bsize=3, comm=PETSc.COMM_SELF)
             self._matrix.setOption(PETSc.Mat.Option.SPD, True)
             self._matrix.setNearNullSpace(near)
             options = PETSc.Options(_PREFIX)
@@ -108,19 +108,19 @@ class Aggregation:
 
     def __call__(self, rows: np.ndarray) -> np.ndarray:
         """Return one V-cycle applied to rows (k, n)."""
-        found, given = np.empty_like(rows), np.zeros(self._matrix.getSize()[0])
-        with owned(_vector(given)) as before, owned(before.duplicate()) as after:
-            for row, result in zip(rows, found, strict=True):
-                before.array[self._places] = row
+        results, work = np.empty_like(rows), np.zeros(self._matrix.getSize()[0])
+        with owned(_vector(work)) as before, owned(before.duplicate()) as after:
+            for row, result in zip(rows, results, strict=True):
+                before.array[self._dofs] = row
                 self._pc.apply(before, after)
-                result[:] = after.array[self._places]
-        return found
+                result[:] = after.array[self._dofs]
+        return results
 
     def __del__(self) -> None:
         if not PETSc.Sys.isFinalized():
-            for made in (getattr(self, "_pc", None), getattr(self, "_matrix", None)):
-                if made is not None:
-                    made.destroy()
+            for handle in (getattr(self, "_pc", None), getattr(self, "_matrix", None)):
+                if handle is not None:
+                    handle.destroy()
 
 
 def _vector(values: np.ndarray) -> Any:

@@ -35,11 +35,11 @@ def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray],
         changed.extend(range(group.start, group.stop))
     if not changed:
         return modes
-    rows, own = shapes[changed], eigenvalues[changed]
+    rows, squares = shapes[changed], eigenvalues[changed]
     rows = shape_signs(rows, rows @ matrices.mass @ matrices.movable_translations())[:, None] * rows
     shapes[changed] = rows
     residuals, free = modes.residuals.copy(), matrices.free
-    inertia = own[:, None] * (rows @ matrices.mass)[:, free]
+    inertia = squares[:, None] * (rows @ matrices.mass)[:, free]
     residuals[changed] = np.linalg.norm((rows @ matrices.stiffness)[:, free] - inertia, axis=1)
     residuals[changed] /= np.linalg.norm(inertia, axis=1)
     return Modes(np.sqrt(eigenvalues) / (2.0 * np.pi), shapes, residuals, modes.provenance)
@@ -48,7 +48,7 @@ def turned(modes: Modes, matrices: SystemMatrices, guides: Sequence[np.ndarray],
 def rivals(modes: Modes, mode: int, functional: np.ndarray, within: float, share: float) -> np.ndarray:
     """Return the indices of the other modes near a mode in frequency that move a functional (N,), too.
 
-    Those whose frequency lies within a relative distance of the mode's, and whose modal compliance at the functional,
+    Modes whose frequency lies within a relative distance of the mode's, and whose modal compliance at the functional,
     (w^T phi)^2, is at least the fraction `share` of the mode's.
     """
     frequency, seen = modes.frequencies_hz[mode], (modes.shapes @ functional) ** 2
@@ -59,15 +59,15 @@ def rivals(modes: Modes, mode: int, functional: np.ndarray, within: float, share
 
 def _groups(frequencies: np.ndarray, tolerance: float) -> list[slice]:
     """Return runs of at least two frequencies, each run within the tolerance of its first one."""
-    found, start = [], 0
+    groups, start = [], 0
     while start < len(frequencies):
         stop = start + 1
         while stop < len(frequencies) and frequencies[stop] <= (1.0 + tolerance) * frequencies[start]:
             stop += 1
         if stop - start > 1 and frequencies[start] > 0.0:
-            found.append(slice(start, stop))
+            groups.append(slice(start, stop))
         start = stop
-    return found
+    return groups
 
 
 def _basis(shapes: np.ndarray, guides: Sequence[np.ndarray]) -> np.ndarray:
@@ -81,9 +81,9 @@ def _basis(shapes: np.ndarray, guides: Sequence[np.ndarray]) -> np.ndarray:
     ]
     rows: list[np.ndarray] = []
     for vector in (*directions, *np.eye(len(shapes))):
-        rest = vector - sum((row @ vector) * row for row in rows)
+        residual = vector - sum((row @ vector) * row for row in rows)
         # twice: the rest of a vector close to the others' span is then orthogonal to them to round-off
-        rest = rest - sum((row @ rest) * row for row in rows)
-        if len(rows) < len(shapes) and np.linalg.norm(rest) > _NOISE:
-            rows.append(rest / np.linalg.norm(rest))
+        residual = residual - sum((row @ residual) * row for row in rows)
+        if len(rows) < len(shapes) and np.linalg.norm(residual) > _NOISE:
+            rows.append(residual / np.linalg.norm(residual))
     return np.array(rows)

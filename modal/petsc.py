@@ -45,9 +45,9 @@ class Factorization:
         self.size = int(matrix.shape[0])
         # only the factor is kept: its inputs take as much memory in the largest structures
         with contextlib.ExitStack() as stack:
-            given = stack.enter_context(owned(_view(matrix)))
+            view = stack.enter_context(owned(_view(matrix)))
             try:
-                self._factor = _factor(stack, given, direct, inertia=direct == "mumps")
+                self._factor = _factor(stack, view, direct, inertia=direct == "mumps")
             except PETSc.Error as error:
                 _forget(direct)
                 raise SolverError(f"{direct}: {' '.join(str(error).split())}") from error
@@ -69,13 +69,13 @@ class Factorization:
         columns = np.asfortranarray(rows.T)
         solution = np.zeros_like(columns, order="F")
         with (
-            owned(PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)) as given,
-            owned(PETSc.Mat().createDense(columns.shape, array=solution, comm=PETSc.COMM_SELF)) as found,
+            owned(PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)) as right,
+            owned(PETSc.Mat().createDense(columns.shape, array=solution, comm=PETSc.COMM_SELF)) as unknowns,
         ):
-            given.assemble()
-            found.assemble()
-            self._factor.matSolve(given, found)
-            return np.array(found.getDenseArray().T, order="C")
+            right.assemble()
+            unknowns.assemble()
+            self._factor.matSolve(right, unknowns)
+            return np.array(unknowns.getDenseArray().T, order="C")
 
     def destroy(self) -> None:
         """Free the memory of the factors."""
@@ -95,8 +95,8 @@ class Factorization:
     def _check(self, matrix: sparse.csr_array, status: int) -> None:
         error = np.inf
         if status >= 0:
-            known = np.random.default_rng(0).standard_normal(self.size)
-            error = np.abs(self.solve(matrix @ known) - known).max()
+            probe = np.random.default_rng(0).standard_normal(self.size)
+            error = np.abs(self.solve(matrix @ probe) - probe).max()
         if not error < _ROUND_TRIP:
             raise SolverError(
                 f"the matrix of size {self.size} is singular to working precision (status {status}); "
@@ -105,7 +105,7 @@ class Factorization:
 
 
 class Product:
-    """A sparse matrix (m, n) that is applied to rows (k, n): several of them share a pass over its entries."""
+    """A sparse matrix (m, n) that is applied to rows (k, n), several in one pass over its entries."""
 
     def __init__(self, matrix: sparse.csr_array) -> None:
         self.shape = matrix.shape
@@ -114,10 +114,10 @@ class Product:
     def __call__(self, rows: np.ndarray) -> np.ndarray:
         """Return the products (k, m)."""
         columns = np.ascontiguousarray(rows).T
-        with owned(PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)) as given:
-            given.assemble()
-            with owned(self._matrix.matMult(given)) as found:
-                return np.array(found.getDenseArray().T, order="C")
+        with owned(PETSc.Mat().createDense(columns.shape, array=columns, comm=PETSc.COMM_SELF)) as operand:
+            operand.assemble()
+            with owned(self._matrix.matMult(operand)) as product:
+                return np.array(product.getDenseArray().T, order="C")
 
     def __del__(self) -> None:
         if hasattr(self, "_matrix") and not PETSc.Sys.isFinalized():
@@ -126,8 +126,8 @@ class Product:
 
 def negative_eigenvalues(matrix: sparse.csr_array) -> int:
     """Return the number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia."""
-    found: int = _on_all_ranks("inertia", (matrix,))
-    return found
+    count: int = _on_all_ranks("inertia", (matrix,))
+    return count
 
 
 def nearest_eigenpairs(
@@ -157,7 +157,7 @@ def nearest_eigenpairs(
 
 
 def has_cholmod() -> bool:
-    """Say whether this PETSc is built with SuiteSparse."""
+    """Whether this PETSc is built with SuiteSparse."""
     return bool(PETSc.Sys.hasExternalPackage("suitesparse"))
 
 
@@ -188,16 +188,16 @@ def interval_eigenpairs(
 def one_analysis() -> Iterator[None]:
     """Within this context, factorise a matrix with the ordering and symbolic factors of one with the same pattern.
 
-    The last factors of each solver are kept for it, which takes memory; those of the next matrix take their place, so
-    that a Factorization serves until then. Without effect on several ranks.
+    The last factors of each solver are kept for it, which takes memory. The factors of the next matrix replace them, so
+    that a Factorization is valid until then. Without effect on several ranks.
     """
     global _analysed
     before, _analysed = _analysed, {} if parallel.COMM.size == 1 else None
     try:
         yield
     finally:
-        for one in (_analysed or {}).values():
-            one.destroy()
+        for analysis in (_analysed or {}).values():
+            analysis.destroy()
         _analysed = before
 
 
@@ -345,7 +345,7 @@ class _Analysed(NamedTuple):
     matrix: Any
 
     def fits(self, matrix: Any) -> bool:
-        """Say whether a matrix has the same pattern."""
+        """Whether a matrix has the same pattern."""
         return all(map(np.array_equal, self.matrix.getRowIJ(), matrix.getRowIJ()))
 
     def destroy(self) -> None:
@@ -359,22 +359,22 @@ _analysed: dict[str, _Analysed] | None = None
 
 def _factor(stack: contextlib.ExitStack, matrix: Any, direct: str = "mumps", inertia: bool = True) -> Any:
     """Return the factor of a matrix of PETSc, by itself or by the analysis of one with the same pattern."""
-    known = None if _analysed is None else _analysed.pop(direct, None)
-    if known is not None and known.fits(matrix):
-        matrix.copy(known.matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        ksp, given = known
+    earlier = None if _analysed is None else _analysed.pop(direct, None)
+    if earlier is not None and earlier.fits(matrix):
+        matrix.copy(earlier.matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        ksp, operator = earlier
     else:
-        if known is not None:
-            known.destroy()
+        if earlier is not None:
+            earlier.destroy()
         ksp = PETSc.KSP().create(matrix.getComm())
-        given = matrix if _analysed is None else matrix.duplicate(copy=True)
-        ksp.setOperators(given)
+        operator = matrix if _analysed is None else matrix.duplicate(copy=True)
+        ksp.setOperators(operator)
         _set_direct(ksp, direct, inertia)
     if _analysed is None:
         stack.callback(ksp.destroy)
     else:
-        _analysed[direct] = _Analysed(ksp, given)
-    ksp.setOperators(given)
+        _analysed[direct] = _Analysed(ksp, operator)
+    ksp.setOperators(operator)
     with _one_thread():
         ksp.setUp()
     return ksp.getPC().getFactorMatrix()

@@ -26,7 +26,7 @@ _TRIALS = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class PoleFit:
     """Least squares over the poles.
 
     poles     (m,) complex, scaled, in the upper half plane
@@ -47,57 +47,57 @@ class Rational:
     values: np.ndarray
     power: int
 
-    def fit(self, start: np.ndarray) -> Fit:
+    def fit(self, start: np.ndarray) -> PoleFit:
         """Return the fit next to the poles (m,) of a start.
 
         Bounds keep the poles where the lines can resolve them: without them noise pulls a pole onto one line, where its
         decay underflows or overflows and the result depends on the last bit.
         """
         if start.size == 0:
-            return Fit(start, self._misfit(start), np.zeros((self._target.size, 0)))
+            return PoleFit(start, self._misfit(start), np.zeros((self._target.size, 0)))
         low, high = np.abs(self.s[0]), np.abs(self.s[-1])
         spacing = float(np.diff(np.abs(self.s)).min())
         least = [max(2 * low - high, 1e-3 * low), np.log(_NARROWEST * spacing / 2)]
         most = [2 * high - low, np.log(high)]
         parameters = np.clip(np.column_stack([start.imag, np.log(-start.real)]), least, most)
-        kept: list[np.ndarray] = [np.empty(0)] * 2
+        latest: list[np.ndarray] = [np.empty(0)] * 2
 
         def error(parameters: np.ndarray) -> np.ndarray:
-            value, kept[1] = self._derived(parameters)
-            kept[0] = parameters.copy()
+            value, latest[1] = self._derived(parameters)
+            latest[0] = parameters.copy()
             return value
 
         def jacobian(parameters: np.ndarray) -> np.ndarray:
-            return kept[1] if np.array_equal(parameters, kept[0]) else self._derived(parameters)[1]
+            return latest[1] if np.array_equal(parameters, latest[0]) else self._derived(parameters)[1]
 
-        found = least_squares(
+        result = least_squares(
             error, parameters.ravel(), jac=jacobian, x_scale="jac",
             bounds=(np.tile(least, start.size), np.tile(most, start.size)), xtol=1e-14, ftol=1e-12, gtol=1e-14,
         )  # fmt: skip
-        return Fit(_unpacked(found.x), float(found.fun @ found.fun), found.jac)
+        return PoleFit(_unpacked(result.x), float(result.fun @ result.fun), result.jac)
 
-    def without_one(self, fit: Fit) -> Fit:
+    def without_one(self, fit: PoleFit) -> PoleFit:
         """Return the best fit with one pole less: each pole left out in turn, and a new set by vector fitting."""
         count = fit.poles.size
         starts = [np.delete(fit.poles, index) for index in range(count)]
-        return min((self.fit(start) for start in [*starts, self.relocated(count - 1)]), key=lambda other: other.misfit)
+        return min((self.fit(start) for start in [*starts, self.relocated(count - 1)]), key=lambda fit: fit.misfit)
 
-    def chance(self, fit: Fit) -> float:
+    def chance(self, fit: PoleFit) -> float:
         """Bound the probability that noise by itself lets the last pole lower the misfit as much as it does.
 
         White noise gives a pole at a fixed place the fraction Beta(k, (N - p)/2) of the misfit without it:
         2 k coefficients, N values, p parameters in all. Complex values count as one number each, not two, so that the
         bound also holds for noise in one of their parts only. A fit chooses the place (Davies 1987; Adler and Taylor
-        2007): the expected number of places that reach a level u is that of one place times the area of the half
+        2007): the expected number of places that reach a level u is that of a single place times the area of the half
         plane of poles in the metric of their correlation. Poles f + i b/2 correlate like Cauchy kernels, metric
         |df|^2/b^2, so bands of n lines and bandwidths from half a line spacing have the area n and the edge 2 n: 6 to
-        9 places a line at the levels 25 to 40 that count.
+        9 places per line at the relevant levels 25 to 40.
         """
         responses, lines = self.values.shape
         freedom = 2 * responses * lines - responses * (2 * fit.poles.size + 2) - 2 * fit.poles.size
         floor = (_ROUND_OFF * np.linalg.norm(self.values)) ** 2
-        left = (fit.misfit + floor) / (self.without_one(fit).misfit + floor)
-        return float(_TRIALS * lines * special.betainc(max(freedom, 1) / 4, responses, min(left, 1.0)))
+        ratio = (fit.misfit + floor) / (self.without_one(fit).misfit + floor)
+        return float(_TRIALS * lines * special.betainc(max(freedom, 1) / 4, responses, min(ratio, 1.0)))
 
     def solve(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the best fit (k, n) and residues (k, m) for given poles."""
@@ -122,7 +122,7 @@ class Rational:
 
     @cached_property
     def _outside(self) -> np.ndarray:
-        """Functions (n, 2) of the stiffness of modes above the band and of the mass of those below."""
+        """Functions (n, 2) of the stiffness of modes above the band and of the mass of modes below it."""
         return np.column_stack([np.ones_like(self.s), self.s**-2.0])
 
     @cached_property
@@ -142,9 +142,9 @@ class Rational:
         functions = _real(self._basis(poles))
         size = np.linalg.norm(functions, axis=0)
         span, values, right = np.linalg.svd(functions / size, full_matrices=False)
-        kept = values > values[0] * functions.shape[0] * np.finfo(float).eps
-        span = span[:, kept]
-        return span, (right[kept].T / size[:, None] / values[kept]) @ (span.T @ self._target)
+        resolved = values > values[0] * functions.shape[0] * np.finfo(float).eps
+        span = span[:, resolved]
+        return span, (right[resolved].T / size[:, None] / values[resolved]) @ (span.T @ self._target)
 
     def _misfit(self, poles: np.ndarray) -> float:
         span = self._projected(poles)[0]
@@ -158,27 +158,27 @@ class Rational:
         count = poles.size
         first = self._weight / (self.s[:, None] - poles) ** 2
         second = self._weight / (self.s[:, None] - poles.conj()) ** 2
-        one, two = coefficients[:count], coefficients[count : 2 * count]
+        real, imaginary = coefficients[:count], coefficients[count : 2 * count]
         plus, minus = first + second, 1j * (first - second)
         columns = np.empty((*self._target.shape, count, 2))
         for index in range(count):
-            moved = minus[:, [index]] * one[index] - plus[:, [index]] * two[index]
-            decayed = poles[index].real * (plus[:, [index]] * one[index] + minus[:, [index]] * two[index])
+            moved = minus[:, [index]] * real[index] - plus[:, [index]] * imaginary[index]
+            decayed = poles[index].real * (plus[:, [index]] * real[index] + minus[:, [index]] * imaginary[index])
             columns[:, :, index, 0], columns[:, :, index, 1] = _real(moved), _real(decayed)
         flat = columns.reshape(len(self._target), -1)
         return error.ravel(), (flat - span @ (span.T @ flat)).reshape(error.size, 2 * count)
 
     def _relocate(self, poles: np.ndarray) -> np.ndarray:
         """Return the zeros of the denominator that makes the fit linear, flipped into the left half plane."""
-        own, common, count = self._basis(poles), self._basis(poles, terms=False), len(poles)
-        width = own.shape[1]
+        basis, common, count = self._basis(poles), self._basis(poles, terms=False), len(poles)
+        width = basis.shape[1]
         values = self.values[:, :, None]
-        shared = np.broadcast_to(own, (len(values), *own.shape))
+        shared = np.broadcast_to(basis, (len(values), *basis.shape))
         rows = np.concatenate([shared, -values * common, values], axis=2)
-        # the common denominator fits the rest that the response's own coefficients leave
+        # the common denominator fits the residual of the response's own coefficients
         triangles = np.asarray(np.linalg.qr(np.concatenate([rows.real, rows.imag], axis=1), mode="r"))
-        rest = triangles[:, width:, width:].reshape(-1, 2 * count + 1)
-        weights = np.linalg.lstsq(rest[:, :-1], rest[:, -1], rcond=None)[0]
+        remainder = triangles[:, width:, width:].reshape(-1, 2 * count + 1)
+        weights = np.linalg.lstsq(remainder[:, :-1], remainder[:, -1], rcond=None)[0]
         rotation = np.diag(np.tile(poles.real, 2))
         at = np.arange(count)
         rotation[at, count + at], rotation[count + at, at] = poles.imag, -poles.imag

@@ -54,8 +54,8 @@ def rigid_model(
     shape, frequency = modes.shapes[mode], modes.angular_frequencies[mode]
     displacement = float(functional @ shape)
     if not _moves(displacement, functional, shape):
-        found = f"mode {mode} ({modes.frequencies_hz[mode]:.5g} Hz)"
-        raise CalibrationError(f"at: {found} does not move {at!r}; name another interface coordinate")
+        described = f"mode {mode} ({modes.frequencies_hz[mode]:.5g} Hz)"
+        raise CalibrationError(f"at: {described} does not move {at!r}; name another interface coordinate")
     if frequency <= 0.0:
         raise CalibrationError(f"mode: mode {mode} is a rigid motion without stiffness; hold the structure")
     mass = 1.0 / displacement**2
@@ -71,7 +71,7 @@ def rigid_model(
 
 
 @dataclass(frozen=True)
-class CavityMotion:
+class ModalCavityMotion:
     """How one mode moves a cavity, as a rigid model of that mode includes it.
 
     along          displacement along the cavity, for unit displacement at the rigid model's interface coordinate
@@ -84,7 +84,7 @@ class CavityMotion:
     rotation: float
 
 
-def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray) -> CavityMotion | None:
+def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray) -> ModalCavityMotion | None:
     """Return how a mode's shape (N,) moves a cavity; None where it does not move along it.
 
     motion: functionals (N, 3) of the motion along, across and of the rotation, or (N, 2) without a rotation;
@@ -94,7 +94,7 @@ def cavity_motion(shape: np.ndarray, motion: np.ndarray, functional: np.ndarray)
     if along is None:
         return None
     normal_motion, *rotation = (motion[:, 1:].T @ shape / (motion[:, 0] @ shape)).tolist()
-    return CavityMotion(along, normal_motion, *(rotation or [0.0]))
+    return ModalCavityMotion(along, normal_motion, *(rotation or [0.0]))
 
 
 def motion_along(shape: np.ndarray, along: np.ndarray, functional: np.ndarray) -> float | None:
@@ -104,7 +104,7 @@ def motion_along(shape: np.ndarray, along: np.ndarray, functional: np.ndarray) -
 
 
 def _moves(displacement: float, functional: np.ndarray, shape: np.ndarray) -> bool:
-    """Say whether a patch moves: its displacement is then of the order of the shape's own."""
+    """Whether a patch moves: its displacement is then of the order of the shape's."""
     return abs(displacement) >= 1e-9 * np.abs(functional).sum() * np.abs(shape).max() and displacement != 0.0
 
 

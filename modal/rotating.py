@@ -30,7 +30,7 @@ class UnstableError(VanedampError):
 
 
 class SpeedError(VanedampError):
-    """A speed beyond those of the matrices; the message names their greatest."""
+    """A speed above the limit of the matrices; the message names this limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class RotatingMatrices:
         return (self.centrifugal_stiffness, *self.higher)
 
     def added(self, speed: float) -> sparse.csr_array:
-        """Return what a speed, rad/s, adds to the stiffness (N, N), N/m. Raises SpeedError beyond the greatest."""
+        """Return the stiffness (N, N), N/m, added at a speed, rad/s. Raises SpeedError beyond the greatest."""
         if speed > self.greatest * (1.0 + 1e-12):
             raise SpeedError(
                 f"speed: the matrices hold up to {self.greatest:.6g} rad/s, not at {speed:.6g}; make them for a higher "
@@ -89,26 +89,26 @@ class RotatingMatrices:
         return replace(self.standing, stiffness=self.standing.stiffness + added, provenance=provenance)
 
     def neglected_error(self, shapes: np.ndarray) -> float:
-        """Return the largest relative error of frequencies for what is neglected between standstill and W_g.
+        """Return the largest relative error of frequencies, due to neglected terms between standstill and W_g.
 
-        That at W_g / 2, near which it is largest, of modes of about these shapes (m, N) there; 0 where not known. Both
-        stiffnesses have Ritz values in the shapes and one step of inverse iteration from them: strains that only one of
-        them resists need room to vanish.
+        Evaluated at W_g / 2, near its largest value, for modes of about these shapes (m, N); 0 where not known. Both
+        stiffnesses have Ritz values in the shapes and one step of inverse iteration from them, so that strains resisted
+        by only one of them can relax.
         """
         if self.neglected is None:
             return 0.0
-        free, given = self.standing.free, self.standing.of_free
-        mass, near = given(self.standing.mass), given(self.standing.stiffness + self.added(0.5 * self.greatest))
-        exact = sparse.csr_array(near + given(self.neglected))
+        free, of_free = self.standing.free, self.standing.of_free
+        mass, near = of_free(self.standing.mass), of_free(self.standing.stiffness + self.added(0.5 * self.greatest))
+        exact = sparse.csr_array(near + of_free(self.neglected))
         fields = shapes[:, free].T
         with factorize(exact) as factors:
             space = orthonormal(np.hstack([fields, factors.solve(mass @ fields)]), mass)
         count = min(len(shapes), space.shape[1])
-        told, right = (
+        approximate, reference = (
             linalg.eigh(symmetric_part(space.T @ (matrix @ space)), eigvals_only=True)[:count]
             for matrix in (near, exact)
         )
-        return float(np.abs(np.sqrt(np.maximum(told, 0.0) / right) - 1.0).max())
+        return float(np.abs(np.sqrt(np.maximum(approximate, 0.0) / reference) - 1.0).max())
 
 
 def unstable_at(speed: float, limit: float) -> UnstableError:

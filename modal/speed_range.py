@@ -1,7 +1,7 @@
 """Modes of a rotating structure at any speed of a range, from full solutions at a few speeds.
 
 The modes at those speeds, joined, are a Ritz basis for all others (Balmes 1996, Mech. Syst. Signal Process. 10): a
-dense problem of some dozen coordinates a speed in place of a sparse one. Frequencies are second-order in the error of
+dense problem of some dozen coordinates per speed instead of a sparse one. Frequencies are second-order in the error of
 the shapes, and the error is estimated from the residual with the full matrices.
 """
 
@@ -19,11 +19,11 @@ from vanedamp.modal.kept_solutions import Arrays, Keep, not_kept
 from vanedamp.modal.records.modes import Modes
 from vanedamp.modal.rotating import RotatingMatrices
 
-# of the unit length of a shape: missing part of it for which the basis gains a field
+# part of a shape of unit length missing in the basis, above which it is added
 _LACKING = 1e-10
-# relative: what of an eigenvalue is round-off, by which it is complex or differs from an equal one
+# relative round-off of an eigenvalue, by which it is complex or differs from an equal one
 _REAL = 1e-9
-# of the highest square that was solved for: the least distance of a mode from it
+# least distance of a mode from the highest square solved for, relative to the latter
 _NEAREST = 1e-3
 
 
@@ -88,7 +88,7 @@ class SpeedRange:
     ) -> None:
         standing, self.rotating, self.gyroscopic = rotating.standing, rotating, gyroscopic
         self._free = standing.free
-        # modes beyond the last of interest, so that those that come down are known before they are among the lowest
+        # further modes, so that falling ones are computed before they are among the lowest
         spare = max(3, count // 2)
         self.count = min(count + spare, self._free.size)
         self._solved_count = min(count + 2 * spare, self._free.size)
@@ -127,10 +127,10 @@ class SpeedRange:
 
     def modes(self, speed: float) -> SpeedModes:
         """Return the modes at a speed."""
-        known = self._known.get(speed)
-        if known is None:
-            known = self._known[speed] = self._ritz(speed)
-        return known
+        modes = self._modes.get(speed)
+        if modes is None:
+            modes = self._modes[speed] = self._ritz(speed)
+        return modes
 
     def slopes(self, modes: SpeedModes) -> np.ndarray:
         """Return (m,) d omega / d speed of modes, those at standstill a little above it, where they differ from zero.
@@ -140,13 +140,13 @@ class SpeedRange:
         speed = max(modes.speed, 1e-9 * max(self.solved))
         weights = speed_weights(speed, self.small.greatest, len(self.small.stiffness) - 1)
         forms = [_form(matrix, modes.shapes).real for matrix in self.small.stiffness[1:]]
-        change = sum(2.0 * (place + 1) / speed * weights[place] * form for place, form in enumerate(forms))
+        change = sum(2.0 * (power + 1) / speed * weights[power] * form for power, form in enumerate(forms))
         if self.gyroscopic:
             change = change + modes.frequencies * self._coupling(modes)
         return np.asarray(change / self._inertia(modes, speed))
 
     def neglected_error(self) -> float:
-        """Return the largest relative error of the frequencies for what the matrices neglect between their speeds."""
+        """Return the largest relative error of the frequencies, due to terms neglected between the matrices' speeds."""
         rotating, shapes = self.rotating, np.zeros((self.count, self.rotating.standing.size))
         if rotating.neglected is None:
             return 0.0
@@ -173,12 +173,12 @@ class SpeedRange:
             return np.zeros(self.count)
         omega, shapes = modes.frequencies, modes.shapes
         weights = speed_weights(speed, self.small.greatest, len(self.small.stiffness) - 1)
-        parts = [shapes, *(weight * shapes for weight in weights), -(omega**2) * shapes]
+        terms = [shapes, *(weight * shapes for weight in weights), -(omega**2) * shapes]
         if self.gyroscopic:
-            parts.append(1j * speed * omega * shapes)
-        joined = np.vstack(parts)
+            terms.append(1j * speed * omega * shapes)
+        joined = np.vstack(terms)
         residual = np.abs(np.einsum("im,im->m", joined.conj(), self._gram @ joined))
-        middle, here = (self.small.stiffness_at(each) for each in (self._middle, speed))
+        middle, here = (self.small.stiffness_at(at) for at in (self._middle, speed))
         residual /= linalg.eigh(here, middle, eigvals_only=True, subset_by_index=[0, 0])
         beyond = self._beyond(speed, here)
         ratio = beyond / np.maximum(beyond - omega**2, _NEAREST * beyond)
@@ -186,8 +186,8 @@ class SpeedRange:
 
     def _beyond(self, speed: float, here: np.ndarray) -> float:
         """Return a lower bound of squared frequencies that the basis lacks; here: the small stiffness at the speed."""
-        places = np.argsort(self.solved)
-        squares, highest = np.square(self.solved)[places], np.array(self._highest)[places]
+        order = np.argsort(self.solved)
+        squares, highest = np.square(self.solved)[order], np.array(self._highest)[order]
         beyond = float(np.interp(speed**2, squares, highest))
         right = int(np.searchsorted(squares, speed**2))
         if len(self.small.stiffness) < 3 or not 0 < right < len(squares):
@@ -215,23 +215,23 @@ class SpeedRange:
         self._highest.append(float(2.0 * np.pi * modes["frequency"][-1]) ** 2)
         shapes = modes["shape"]
         shapes = np.vstack([shapes.real, shapes.imag]) if self.gyroscopic else shapes
-        mass, known = self._mass, [self.basis]
-        rest = orthogonal(shapes[:, self._free].T, mass, known)
-        lacking = np.einsum("ij,ij->j", rest, mass @ rest) > _LACKING**2
-        fields = orthonormal(rest[:, lacking], mass, known)
+        mass, bases = self._mass, [self.basis]
+        residual = orthogonal(shapes[:, self._free].T, mass, bases)
+        lacking = np.einsum("ij,ij->j", residual, mass @ residual) > _LACKING**2
+        fields = orthonormal(residual[:, lacking], mass, bases)
         if not fields.shape[1]:
             return
         self.basis = np.hstack([self.basis, fields])
-        for place, operator in enumerate(self._operators):
+        for index, operator in enumerate(self._operators):
             forces = operator @ fields
-            self._forces[place] = np.hstack([self._forces[place], forces])
-            self._compliant[place] = np.hstack([self._compliant[place], self._factor.solve(forces)])
-        made = [self.basis.T @ forces for forces in self._forces]
+            self._forces[index] = np.hstack([self._forces[index], forces])
+            self._compliant[index] = np.hstack([self._compliant[index], self._factor.solve(forces)])
+        projected = [self.basis.T @ forces for forces in self._forces]
         powers = 1 + len(self.rotating.by_speed)
-        coupling = made[-1] if self.gyroscopic else None
-        self.small = SmallMatrices(tuple(made[:powers]), made[powers], coupling, self.rotating.greatest)
+        coupling = projected[-1] if self.gyroscopic else None
+        self.small = SmallMatrices(tuple(projected[:powers]), projected[powers], coupling, self.rotating.greatest)
         self._gram = np.hstack(self._forces).T @ np.hstack(self._compliant)
-        self._known: dict[float, SpeedModes] = {}
+        self._modes: dict[float, SpeedModes] = {}
 
     def _ritz(self, speed: float) -> SpeedModes:
         frequencies, vectors = ritz_modes(self.small, speed)
@@ -279,13 +279,13 @@ def meetings(small: SmallMatrices, order: float) -> list[tuple[int, float]]:
     root = linalg.solve_triangular(
         linalg.cholesky(hermitian_part(small.stiffness[0]), lower=True), np.eye(size), lower=True
     )
-    rows = [root @ term @ root.conj().T for term in (scale * inertia, *(-each for each in small.stiffness[2:]))]
+    rows = [root @ term @ root.conj().T for term in (scale * inertia, *(-matrix for matrix in small.stiffness[2:]))]
     companion = np.vstack([np.hstack(rows), np.eye(size * (len(rows) - 1), size * len(rows))])
     inverses = linalg.eigvals(companion)
     real = (np.abs(inverses.imag) <= _REAL * np.abs(inverses)) & (inverses.real > 1.0 - _REAL)
-    found: list[tuple[int, float]] = []
+    met: list[tuple[int, float]] = []
     for speed in np.sqrt(scale / np.sort(inverses[real].real)[::-1]).tolist():
         lower = np.count_nonzero(ritz_modes(small, speed)[0] < order * speed * (1.0 - _REAL))
-        equal = sum(other >= speed * (1.0 - _REAL) for _, other in found)
-        found.append((int(lower) + equal, speed))
-    return found
+        equal = sum(earlier >= speed * (1.0 - _REAL) for _, earlier in met)
+        met.append((int(lower) + equal, speed))
+    return met

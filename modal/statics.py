@@ -1,4 +1,4 @@
-"""Static solutions and stability of a structure, as prestress needs them; `cyclic_statics` has those of a ring."""
+"""Static solutions and stability of a structure, for prestress; of a ring, see `cyclic_statics`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vanedamp.modal.matrices import SystemMatrices
 
 
 class Statics:
-    """Those of a structure by itself."""
+    """Static solutions and stability of a single structure."""
 
     def solver(self, matrices: SystemMatrices) -> AbstractContextManager[Callable[[np.ndarray], np.ndarray]]:
         """Return a context with the displacements (N,), m, by a static load (N,), N.

@@ -1,4 +1,4 @@
-"""Where a mode is strained most: the hot spot that a fatigue strength is compared with, and how sure its stress is."""
+"""Hot spot of a mode, where its stress is compared with a fatigue strength, and the error of this stress."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class PeakStress(NamedTuple):
 class HotSpot:
     """The place of a displacement field that exhausts its material most.
 
-    stress       Pa, von Mises, as that of its PeakStress
+    stress       Pa, von Mises, as in its PeakStress
     strength     Pa, of its volume group
     coordinates  m
     group        volume group
@@ -62,13 +62,13 @@ def peak_stresses(
     recovery, stress = solid.recovery, solid.von_mises(displacement)
     counted = stress if excluded is None else np.where(excluded, 0.0, stress)
     members = [np.flatnonzero(recovery.groups == number) for number in range(len(solid.domain.volumes))]
-    worst = np.array([places[first_largest(counted[places])] for places in members])
+    worst = np.array([points[first_largest(counted[points])] for points in members])
     errors = solid.stress_errors(displacement, worst) / np.maximum(stress[worst], np.finfo(float).tiny)
     peaks = []
-    for name, place, error in zip(solid.domain.volumes, worst, errors, strict=True):
-        x, y, z = recovery.places[place].tolist()
-        found = singular_point(solid, int(place), matrices)
-        peaks.append(PeakStress(float(counted[place]), (x, y, z), name, float(error), found))
+    for name, point, error in zip(solid.domain.volumes, worst, errors, strict=True):
+        x, y, z = recovery.places[point].tolist()
+        singular = singular_point(solid, int(point), matrices)
+        peaks.append(PeakStress(float(counted[point]), (x, y, z), name, float(error), singular))
     return peaks
 
 
@@ -79,9 +79,9 @@ def singular_point(solid: Solid, point: int, matrices: SystemMatrices | None = N
         return f"a re-entrant corner of {angle:.0f} degrees"
     if matrices is not None:
         nodes, counts = np.unique(matrices.fixed // 3, return_counts=True)
-        held = matrices.coordinates[nodes[counts == 3]]
+        clamped = matrices.coordinates[nodes[counts == 3]]
         size = np.ptp(matrices.coordinates, axis=0).max()
-        if len(held) and cKDTree(held).query(solid.recovery.around(point))[0].min() < 1e-9 * size:
+        if len(clamped) and cKDTree(clamped).query(solid.recovery.around(point))[0].min() < 1e-9 * size:
             return "a clamped support"
     return ""
 

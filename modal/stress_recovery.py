@@ -42,30 +42,31 @@ class StressRecovery:
         numbers = np.empty(len(cells), dtype=np.int64)
         for number, members in enumerate(domain.volumes.values()):
             numbers[members] = number
-        known, places = np.unique(numbers[:, None] * len(coordinates) + cells, return_inverse=True)
-        self.corners = places.reshape(cells.shape)
-        self.groups, self._vertices = np.divmod(known, len(coordinates))
+        keys, indices = np.unique(numbers[:, None] * len(coordinates) + cells, return_inverse=True)
+        self.corners = indices.reshape(cells.shape)
+        self.groups, self._vertices = np.divmod(keys, len(coordinates))
         self.places = coordinates[self._vertices]
         self._cells, self._coordinates = cells, coordinates
         self._points, self._to_corners = _sampling(cells.shape[1], degree)
 
     def of_cells(self, stress: Any) -> OfCells:
-        """Return what evaluates a UFL stress tensor in cells, with the functions in it as they are when called."""
+        """Return a function that evaluates a UFL stress tensor in cells, with its functions' values when called."""
         components = ufl.as_vector([stress[pair] for pair in _PAIRS])
         sample = fenicsx.sampler(components, self._mesh, self._points)
         return lambda cells: np.einsum("cq,eqi->eci", self._to_corners, sample(cells))
 
     def mean(self, of_cells: OfCells, points: np.ndarray | None = None) -> Callable[[], np.ndarray]:
-        """Return what evaluates the recovered stress (6, k) at places (indices; default: all)."""
+        """Return a function that evaluates the recovered stress (6, k) at places (indices; default: all)."""
         wanted = np.arange(len(self.places)) if points is None else np.asarray(points)
         cells = self.cells_at(wanted)
-        own = self.corners[cells].ravel()
+        corners = self.corners[cells].ravel()
         row = np.full(len(self.places), -1)
         row[wanted] = np.arange(len(wanted))  # of a place that is wanted twice, the last
-        used = row[own] >= 0
-        counts = np.bincount(row[own[used]], minlength=len(wanted))
+        used = row[corners] >= 0
+        counts = np.bincount(row[corners[used]], minlength=len(wanted))
         average = sparse.csr_array(
-            (1.0 / counts[row[own[used]]], (row[own[used]], np.flatnonzero(used))), shape=(len(wanted), own.size)
+            (1.0 / counts[row[corners[used]]], (row[corners[used]], np.flatnonzero(used))),
+            shape=(len(wanted), corners.size),
         )
         return lambda: np.asarray((average @ of_cells(cells).reshape(-1, 6)).T[:, row[wanted]])
 
@@ -128,10 +129,10 @@ def interior_angles(cells: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
     _, start, shared = np.unique(keys[order], return_index=True, return_counts=True)
     pairs = order[np.add.outer(start[shared == 2], [0, 1])]
     left, right = (pairs // faces.shape[1]).T
-    turn = np.degrees(np.arccos(np.clip((normal[left] * normal[right]).sum(axis=1), -1.0, 1.0)))
+    fold = np.degrees(np.arccos(np.clip((normal[left] * normal[right]).sum(axis=1), -1.0, 1.0)))
     concave = (normal[left] * (middle[right] - middle[left])).sum(axis=1) > 0.0
     angles = np.zeros(len(coordinates))
-    np.maximum.at(angles, edges[pairs[:, 0]].ravel(), np.repeat(180.0 + np.where(concave, turn, -turn), 2))
+    np.maximum.at(angles, edges[pairs[:, 0]].ravel(), np.repeat(180.0 + np.where(concave, fold, -fold), 2))
     return angles
 
 

@@ -1,4 +1,4 @@
-"""A growing space of mass-orthonormal vectors, with an operator projected on it: what block eigensolvers share."""
+"""A growing space of mass-orthonormal vectors, with a projected operator: the base of the block eigensolvers."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class Subspace:
             inertia = self.mass(rows)
             scale = np.sqrt(np.maximum(np.einsum("ij,ij->i", rows, inertia), np.finfo(float).tiny))
             gram = symmetric_part((rows @ inertia.T) / scale / scale[:, None])
-            values, turns = linalg.eigh(gram)
-            kept = values > _DEPENDENT
-            turn, root = turns[:, kept], np.sqrt(values[kept])
-            rows, inertia = ((turn / scale[:, None] / root).T @ each for each in (rows, inertia))
-            shares = shares @ (turn * scale[:, None] * root)
-            if values[kept].min(initial=1.0) > _LOSING:
+            values, vectors = linalg.eigh(gram)
+            independent = values > _DEPENDENT
+            selected, root = vectors[:, independent], np.sqrt(values[independent])
+            rows, inertia = ((selected / scale[:, None] / root).T @ array for array in (rows, inertia))
+            shares = shares @ (selected * scale[:, None] * root)
+            if values[independent].min(initial=1.0) > _LOSING:
                 break
             rows = self.orthogonal(rows)[0]
         self.block, self.inertia = len(rows), inertia
@@ -62,19 +62,19 @@ class Subspace:
 
         first: of the rows of the space along which the components are more than round-off.
         """
-        found = np.zeros((self.count, len(rows)))
+        components = np.zeros((self.count, len(rows)))
         for start in (first, 0):  # twice is enough (Parlett 1980, The Symmetric Eigenvalue Problem, section 6-9)
             shares = self.vectors[start : self.count] @ self.mass(rows).T
             rows = rows - shares.T @ self.vectors[start : self.count]
-            found[start:] += shares
-        return rows, found
+            components[start:] += shares
+        return rows, components
 
-    def turn(self, turns: np.ndarray) -> None:
+    def turn(self, vectors: np.ndarray) -> None:
         """Replace the first rows by orthonormal combinations (k, j) of them, and drop the others."""
         for start in range(0, self.size, _COLUMNS):  # in place
             columns = slice(start, start + _COLUMNS)
-            self.vectors[: turns.shape[1], columns] = turns.T @ self.vectors[: len(turns), columns]
-        self.count = turns.shape[1]
+            self.vectors[: vectors.shape[1], columns] = vectors.T @ self.vectors[: len(vectors), columns]
+        self.count = vectors.shape[1]
 
 
 def product(matrix: Any, rows: np.ndarray) -> np.ndarray:

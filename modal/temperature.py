@@ -13,7 +13,7 @@ from scipy.spatial import QhullError, cKDTree
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 
-# of the size of the points: places so near outside their hull take the temperature of the nearest point
+# fraction of the points' extent: up to this outside their hull, the temperature of the nearest point holds
 _OUTSIDE = 0.01
 
 
@@ -54,13 +54,13 @@ class Temperature:
         if self.points is None:
             return np.full(len(places), float(self.values))
         try:
-            found = np.asarray(self._interpolator(places / self._size))
+            temperatures = np.asarray(self._interpolator(places / self._size))
         except (QhullError, ValueError):
             raise TemperatureError(
                 f"temperature: the {len(self.values)} points lie in one plane or are fewer than four; give points "
                 "around the structure"
             ) from None
-        outside = np.flatnonzero(np.isnan(found))
+        outside = np.flatnonzero(np.isnan(temperatures))
         if outside.size:
             distances, nearest = cKDTree(self.points).query(places[outside])
             worst = int(np.argmax(distances))
@@ -70,8 +70,8 @@ class Temperature:
                     f"temperature: the structure reaches beyond the points: ({x:.4g}, {y:.4g}, {z:.4g}) m lies "
                     f"outside, {distances[worst]:.3g} m from the nearest; give points around the structure, in metres"
                 )
-            found[outside] = self.values[nearest]
-        return found
+            temperatures[outside] = self.values[nearest]
+        return temperatures
 
     @property
     def _size(self) -> float:

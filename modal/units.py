@@ -56,12 +56,12 @@ def doubts(
     mass       kg
     first_hz   first straining natural frequency; None if there is none
     """
-    found = _of_materials(materials) + _of_size(size)
+    reasons = _of_materials(materials) + _of_size(size)
     if _outside(mass, MASSES):
-        found.append(f"the mass is {mass:.3g} kg")
+        reasons.append(f"the mass is {mass:.3g} kg")
     if first_hz is not None and _outside(first_hz, FREQUENCIES):
-        found.append(f"the first frequency is {first_hz:.4g} Hz")
-    return _together(found, "mesh in m, young in Pa, density in kg/m^3")
+        reasons.append(f"the first frequency is {first_hz:.4g} Hz")
+    return _together(reasons, "mesh in m, young in Pa, density in kg/m^3")
 
 
 def size_doubts(size: float) -> tuple[str, ...]:
@@ -70,18 +70,18 @@ def size_doubts(size: float) -> tuple[str, ...]:
 
 
 def material_doubts(materials: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
-    """Explain why materials, as those of `doubts`, are implausible; one line, or none."""
+    """Explain why materials (as in `doubts`) are implausible; one line, or none."""
     return _together(_of_materials(materials), "young in Pa, density in kg/m^3")
 
 
 def _of_materials(materials: Mapping[str, tuple[float, float]]) -> list[str]:
-    found = []
+    reasons = []
     for group, (young, density) in materials.items():
         speed = math.sqrt(young / density)
         if _outside(speed, SPEEDS):
             slip = f", as when young is in MPa (then {1e6 * young:.3g} Pa)" if young < 1e7 else ""
-            found.append(f"sound travels at {speed:.3g} m/s in {group!r}{slip}")
-    return found
+            reasons.append(f"sound travels at {speed:.3g} m/s in {group!r}{slip}")
+    return reasons
 
 
 def _of_size(size: float) -> list[str]:
@@ -91,17 +91,17 @@ def _of_size(size: float) -> list[str]:
 
 def model_doubts(effective_mass: float, first_hz: float) -> tuple[str, ...]:
     """Explain the same of a reduced model, from the smallest effective mass (kg) of its first straining mode."""
-    found = []
+    reasons = []
     if math.isfinite(effective_mass) and _outside(effective_mass, _MODEL_MASSES):
         slip = "; of a model in t and mm, set matrices.mass_scale = 1e3" if effective_mass < _MODEL_MASSES[0] else ""
-        found.append(f"the first mode has an effective mass of {effective_mass:.3g} kg at the interface{slip}")
+        reasons.append(f"the first mode has an effective mass of {effective_mass:.3g} kg at the interface{slip}")
     if _outside(first_hz, FREQUENCIES):
-        found.append(f"the first frequency is {first_hz:.4g} Hz")
-    return _together(found, "mass in kg, stiffness in N/m")
+        reasons.append(f"the first frequency is {first_hz:.4g} Hz")
+    return _together(reasons, "mass in kg, stiffness in N/m")
 
 
-def _together(found: list[str], units: str) -> tuple[str, ...]:
-    return (f"{'; '.join(found)}; check the units: {units}",) if found else ()
+def _together(reasons: list[str], units: str) -> tuple[str, ...]:
+    return (f"{'; '.join(reasons)}; check the units: {units}",) if reasons else ()
 
 
 def _outside(value: float, bounds: tuple[float, float]) -> bool:

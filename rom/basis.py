@@ -26,7 +26,7 @@ from vanedamp.rom.truncation import massless, truncated
 
 @dataclass(frozen=True)
 class ReductionBasis:
-    """What a basis retains: modes, and the static response of the rest of the structure.
+    """A reduction basis: modes, and the static response of the remaining structure.
 
     held: whether the modes are those with the interface held; attached: blocks of attachment modes of natural modes;
     without_mass: whether the rest is a boundary without mass; more: whether further blocks follow on the attached ones;
@@ -46,21 +46,21 @@ class ReductionBasis:
         keep_recovery: bool = False, quasi_static: int = 0, characteristic: int = 6,
     ) -> ReducedModel:  # fmt: skip
         """Return the model with that many modes. Arguments and errors: see rom.reduction.reduce."""
-        given = matrices, interface
+        structure = matrices, interface
         if self.held:
             most = interface.motions.shape[1] - len(interface.labels) - interface.full.size
-            kept = min(max(2 * modes, modes + 10), most) if self.without_mass else modes
-            model = craig_bampton.reduce(*given, kept, factorize, keep_recovery, quasi_static, characteristic)
+            enough = min(max(2 * modes, modes + 10), most) if self.without_mass else modes
+            model = craig_bampton.reduce(*structure, enough, factorize, keep_recovery, quasi_static, characteristic)
         else:
             blocks = self.attached + (quasi_static if self.more else 0)
-            model = free_interface.reduce_free(*given, modes, factorize, keep_recovery, blocks)
+            model = free_interface.reduce_free(*structure, modes, factorize, keep_recovery, blocks)
         return massless(model, modes) if self.without_mass else model
 
     def rich(
         self, matrices: SystemMatrices, interface: Interface, modes: int, factorize: Factorize, blocks: int,
         keep_recovery: bool = False,
     ) -> ReducedModel:  # fmt: skip
-        """Return the model from which `cut` takes those up to `modes`, with that many blocks of quasi-static modes.
+        """Return the model from which `cut` takes those with up to `modes`, with that many quasi-static blocks.
 
         With 1 + BLOCKS, it has their error estimates as well (rom.error_estimate); Craig-Bampton models then have one.
         """
@@ -107,8 +107,8 @@ def basis_ladder(
     rich: ReducedModel, basis: str, frequencies_hz: np.ndarray, labels: Sequence[str] | None = None
 ) -> list[Rung]:
     """Return the error of every model of a basis that can be cut from a rich one, against the latter."""
-    found = basis_named(basis)
-    models = [(modes, found.cut(rich, modes)) for modes in range(found.least_modes(rich), rich.modes + 1)]
+    reduction = basis_named(basis)
+    models = [(modes, reduction.cut(rich, modes)) for modes in range(reduction.least_modes(rich), rich.modes + 1)]
     return [
         Rung(modes, model.size, float(frf_errors(model, rich, frequencies_hz, labels).max()), 0.0)
         for modes, model in models

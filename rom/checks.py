@@ -14,7 +14,7 @@ from vanedamp.modal.algebra import symmetric_part
 _ASYMMETRY = 1e-9
 # negative eigenvalues of a semidefinite K, relative to the largest: round-off of the rigid motions of a free structure
 _INDEFINITE = 1e-9
-# of a matrix's largest entry: smaller diagonal entries count as zero
+# relative to a matrix's largest entry: smaller diagonal entries count as zero
 _LEAST = 1e-60
 
 

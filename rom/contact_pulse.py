@@ -1,8 +1,8 @@
 """Pulse of one collision of a body with a wall of the structure, and its error due to omitted modes.
 
-The modes are at rest and the body comes with unit speed. While they touch, body, contact and modes are one linear
-system, and the pulse is a sum of exponentials until the contact's force vanishes. The excited motion responds to
-its Fourier transform at the excitation frequency: the impulse, and with its phase the moment at which it acts.
+The modes are at rest, and the body arrives at unit speed. During contact, body, contact and modes are one linear
+system, and the pulse is a sum of exponentials until the contact force vanishes. The excited motion responds to its
+Fourier transform at the excitation frequency, which gives the impulse and, by its phase, the instant of action.
 
 Needs numpy and scipy only.
 """
@@ -20,7 +20,7 @@ _LONGEST, _LOOKS = 6, 300
 
 
 @dataclass(frozen=True)
-class Collision:
+class WallContact:
     """Contact of a body with a wall of the structure.
 
     label      interface coordinate of the wall
@@ -42,7 +42,7 @@ class Pulse(NamedTuple):
     duration: float
 
 
-def pulse(squares: np.ndarray, row: np.ndarray, collision: Collision, frequency_hz: float) -> Pulse:
+def pulse(squares: np.ndarray, row: np.ndarray, collision: WallContact, frequency_hz: float) -> Pulse:
     """Return the pulse at a wall with modes of squared angular frequencies (n,) and mass-normalised functional (n,).
 
     The transform is taken at `frequency_hz`, from the moment of touching; damping of the modes is left out.
@@ -82,7 +82,7 @@ def pulse_spectrum(ratio: np.ndarray | float) -> np.ndarray:
     return np.where(near, math.pi / 4.0, np.abs(np.cos(math.pi * safe / 2.0) / (1.0 - safe**2)))
 
 
-def share_above(squares: np.ndarray, row: np.ndarray, modes: int, collision: Collision) -> float:
+def share_above(squares: np.ndarray, row: np.ndarray, modes: int, collision: WallContact) -> float:
     """Return the fraction of an elastic collision's energy that modes beyond the first `modes` of a wall would take.
 
     A half sine of force at the contact frequency leaves mode j the energy (row_j p S(omega_j))^2 / 2, p the impulse at

@@ -47,8 +47,8 @@ def rounding(stiffness: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     |phi|^T |K| |phi| eps / 2: first order perturbation by a componentwise backward error (Higham 2002, Accuracy and
     Stability of Numerical Algorithms, section 7.2). No units play a part, and neither do higher modes.
     """
-    own = np.einsum("ij,ij->j", np.abs(shapes), np.abs(stiffness) @ np.abs(shapes))
-    return np.asarray(0.5 * np.finfo(float).eps * own)
+    energies = np.einsum("ij,ij->j", np.abs(shapes), np.abs(stiffness) @ np.abs(shapes))
+    return np.asarray(0.5 * np.finfo(float).eps * energies)
 
 
 def count_rigid_motions(stiffness: np.ndarray, squares: np.ndarray, shapes: np.ndarray) -> int:

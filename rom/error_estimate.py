@@ -23,7 +23,7 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files.errors import VanedampError
-from vanedamp.rom.contact_pulse import Collision, pulse, share_above
+from vanedamp.rom.contact_pulse import WallContact, pulse, share_above
 from vanedamp.rom.dense_modes import spectrum
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.rom.truncation import massless, with_attachment_modes
@@ -43,8 +43,8 @@ class LadderError(VanedampError):
 class Rung:
     """A model of the hierarchy with its estimated errors, relative: of the receptance, of the pulses of collisions.
 
-    above: fraction of a collision's energy that modes beyond the model's would take, which need not be an error;
-    attached: whether the modes come with residual attachment modes (ReducedModel.attached).
+    above: fraction of a collision's energy that modes beyond the model would take, which is not necessarily an error;
+    attached: whether the model has residual attachment modes (ReducedModel.attached).
     """
 
     modes: int
@@ -147,7 +147,7 @@ def natural_ladder(
     frequencies_hz: np.ndarray,
     labels: Sequence[str] | None = None,
     forces: Sequence[str] | None = None,
-    collisions: Callable[[ReducedModel], Sequence[Collision]] = lambda model: (),
+    collisions: Callable[[ReducedModel], Sequence[WallContact]] = lambda model: (),
     attached: bool = False,
 ) -> list[Rung]:
     """Return the errors of models of 1, 2, 3, ... natural modes of a model against the whole, which is the last.
@@ -183,7 +183,7 @@ def _natural_models(richer: ReducedModel, attached: bool) -> Iterator[ReducedMod
     yield massless(richer, richer.size)
 
 
-def _pulses(model: ReducedModel, collisions: Sequence[Collision], frequency_hz: float) -> list[complex]:
+def _pulses(model: ReducedModel, collisions: Sequence[WallContact], frequency_hz: float) -> list[complex]:
     squares, shapes = spectrum(model.mass, model.stiffness)
     return [pulse(squares, model.row(item.label) @ shapes, item, frequency_hz).transform for item in collisions]
 

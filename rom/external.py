@@ -18,7 +18,7 @@ from vanedamp.modal.algebra import symmetric_part
 from vanedamp.rom import checks
 from vanedamp.rom.reduced import ReducedModel
 
-# of the largest entry or eigenvalue: other codes write 5 to 9 digits, of which the last are not symmetric
+# relative to the largest entry or eigenvalue: other codes write 5 to 9 digits, the last of which are not symmetric
 _ASYMMETRY = 1e-6
 _INDEFINITE = 1e-6
 
@@ -47,20 +47,20 @@ def plain_matrices(model: ReducedModel) -> dict[str, np.ndarray]:
     """Return mass, stiffness, damping (m, m), selection (k, m) and base_load (m, 3) of a model, as other codes take it.
 
     A residual flexibility V diag(s) V^T becomes further coordinates without mass, of stiffness 1 / s, by which the
-    interface moves by V: what `external_model` condenses into the same flexibility again.
+    interface moves by V: `external_model` condenses them into the same flexibility again.
     """
-    found = {
+    matrices = {
         name: np.array(getattr(model, name)) for name in ("mass", "stiffness", "damping", "selection", "base_load")
     }
     if model.residual_flexibility is None:
-        return found
+        return matrices
     values, vectors = linalg.eigh(model.residual_flexibility)
-    kept = values > np.finfo(float).eps * len(values) * values[-1]
-    springs = {"mass": 0.0 * values[kept], "damping": 0.0 * values[kept], "stiffness": 1.0 / values[kept]}
-    found |= {name: linalg.block_diag(found[name], np.diag(added)) for name, added in springs.items()}
-    found["selection"] = np.hstack([found["selection"], vectors[:, kept]])
-    found["base_load"] = np.vstack([found["base_load"], np.zeros((int(kept.sum()), 3))])
-    return found
+    flexible = values > np.finfo(float).eps * len(values) * values[-1]
+    springs = {"mass": 0.0 * values[flexible], "damping": 0.0 * values[flexible], "stiffness": 1.0 / values[flexible]}
+    matrices |= {name: linalg.block_diag(matrices[name], np.diag(added)) for name, added in springs.items()}
+    matrices["selection"] = np.hstack([matrices["selection"], vectors[:, flexible]])
+    matrices["base_load"] = np.vstack([matrices["base_load"], np.zeros((int(flexible.sum()), 3))])
+    return matrices
 
 
 def external_model(
@@ -81,8 +81,8 @@ def external_model(
     beyond the digits of a text file, and ReducedModelError for parts that do not fit together.
     """
     matrices = {"mass": mass, "stiffness": stiffness} | ({} if damping is None else {"damping": damping})
-    given = matrices | ({} if base_load is None else {"base_load": base_load})
-    for name, matrix in given.items():
+    arrays = matrices | ({} if base_load is None else {"base_load": base_load})
+    for name, matrix in arrays.items():
         if np.iscomplexobj(matrix) and np.any(np.imag(matrix)):
             raise ExternalError(
                 f"{name}: complex; give real matrices, and damping or damping_ratio (structural damping K (1 + i eta): "
@@ -98,10 +98,10 @@ def external_model(
         checks.check_size(name, matrix)
     checks.check_mass(matrices["mass"])
     for name in ("mass", "stiffness"):
-        place = int(np.argmin(np.diag(matrices[name])))
-        if matrices[name][place, place] < 0.0:
+        index = int(np.argmin(np.diag(matrices[name])))
+        if matrices[name][index, index] < 0.0:
             raise ExternalError(
-                f"{name}: not positive definite: coordinate {place} has {matrices[name][place, place]:.3g} on the "
+                f"{name}: not positive definite: coordinate {index} has {matrices[name][index, index]:.3g} on the "
                 "diagonal, which is negative; check its sign"
             )
     asymmetry, worst = max((checks.asymmetry(matrix), name) for name, matrix in matrices.items())
@@ -109,11 +109,11 @@ def external_model(
         raise ExternalError(f"{worst}: not symmetric ({asymmetry:.1e}); if only one triangle is stored, mirror it")
     matrices = {name: symmetric_part(matrix) for name, matrix in matrices.items()}
     size = len(mass)
-    rows = {label: _row(label, given, size) for label, given in interface.items()}
+    rows = {label: _row(label, coordinate, size) for label, coordinate in interface.items()}
     massless = ~np.any(matrices["mass"], axis=0)
     definiteness = {}
-    for name, kept in (("mass", ~massless), ("stiffness", matrices["stiffness"].any(axis=0))):
-        value = definiteness[name] = checks.definiteness(matrices[name][np.ix_(kept, kept)])
+    for name, retained in (("mass", ~massless), ("stiffness", matrices["stiffness"].any(axis=0))):
+        value = definiteness[name] = checks.definiteness(matrices[name][np.ix_(retained, retained)])
         if value < -_INDEFINITE:
             raise ExternalError(f"{name}: not positive definite (lowest eigenvalue {value:.1e} of the highest)")
     residual = None
@@ -138,12 +138,12 @@ def _condensed(
         inner = linalg.cho_factor(stiffness[np.ix_(massless, massless)])
     except linalg.LinAlgError as error:
         raise ExternalError("stiffness: coordinates without mass are held by nothing; remove them") from error
-    kept = ~massless
-    basis = np.zeros((len(stiffness), int(kept.sum())))
-    basis[kept] = np.eye(basis.shape[1])
-    basis[massless] = -linalg.cho_solve(inner, stiffness[np.ix_(massless, kept)])
-    felt = np.array(list(rows.values()))[:, massless]
-    residual = felt @ linalg.cho_solve(inner, felt.T)
+    retained = ~massless
+    basis = np.zeros((len(stiffness), int(retained.sum())))
+    basis[retained] = np.eye(basis.shape[1])
+    basis[massless] = -linalg.cho_solve(inner, stiffness[np.ix_(massless, retained)])
+    boundary = np.array(list(rows.values()))[:, massless]
+    residual = boundary @ linalg.cho_solve(inner, boundary.T)
     return (
         {name: basis.T @ matrix @ basis for name, matrix in matrices.items()},
         {label: row @ basis for label, row in rows.items()},
@@ -152,9 +152,9 @@ def _condensed(
     )
 
 
-def _row(label: str, given: int | Sequence[float] | np.ndarray, size: int) -> np.ndarray:
-    if isinstance(given, int | np.integer):
-        if not 0 <= given < size:
-            raise ExternalError(f"interface {label!r}: coordinate {given} out of 0 to {size - 1}")
-        return np.eye(size)[given]
-    return np.asarray(given, dtype=float)
+def _row(label: str, coordinate: int | Sequence[float] | np.ndarray, size: int) -> np.ndarray:
+    if isinstance(coordinate, int | np.integer):
+        if not 0 <= coordinate < size:
+            raise ExternalError(f"interface {label!r}: coordinate {coordinate} out of 0 to {size - 1}")
+        return np.eye(size)[coordinate]
+    return np.asarray(coordinate, dtype=float)

@@ -17,11 +17,11 @@ from vanedamp.rom.reduced import NORMAL, ROTATION
 
 KINDS = ("average", "rigid", "node", "full")
 MOTIONS = ("translation", "rotation")
-# of the largest singular value: below it a functional, or a rigid motion of a patch, is a combination of the others
+# relative to the largest singular value: below it, a functional or a patch's rigid motion depends on the others
 _DEPENDENT = 1e-10
-# the same of the constraints between rigid patches: an edge, straight within that fraction of its length, is a hinge
+# same for constraints between rigid patches: an edge, straight within this fraction of its length, is a hinge
 _STRAIGHT = 1e-5
-# a shorter mean normal belongs to a closed surface, or to several surfaces that face apart
+# a shorter mean normal belongs to a closed surface, or to surfaces that face different ways
 _FLAT, _ONE_WAY = 0.5, 0.9
 # sine of the least angle between the directions along and across that span a plane
 _APART = 0.5**0.5
@@ -118,8 +118,8 @@ def plane_motion(
     second /= np.linalg.norm(second)
     groups = (facets,) if isinstance(facets, str) else tuple(facets)
     (patch, centroid, offsets), point = _around(matrices, groups), None
-    known = any(matrices.patch(group).normal.any() for group in groups)
-    if kind == "patch" and known and np.linalg.norm(patch.normal) < _ONE_WAY:
+    oriented = any(matrices.patch(group).normal.any() for group in groups)
+    if kind == "patch" and oriented and np.linalg.norm(patch.normal) < _ONE_WAY:
         raise InterfaceError(
             f'{label}: {", ".join(groups)} faces several ways; take kind = "cavity" for all surfaces of a cavity, or '
             "one entry for each surface"
@@ -127,21 +127,21 @@ def plane_motion(
     if kind == "cavity":
         middle = 0.5 * (np.min(offsets @ first) + np.max(offsets @ first))
         point = _triple(centroid + middle * first + np.min(offsets @ second) * second)
-    own, one = "node" if kind == "node" else "average", facets if isinstance(facets, str) else groups
+    point_kind, surface = "node" if kind == "node" else "average", facets if isinstance(facets, str) else groups
     motion = [
-        InterfaceCoordinate(label, one, _triple(first), own, point=point),
-        InterfaceCoordinate(label + NORMAL, one, _triple(second), own, point=point),
+        InterfaceCoordinate(label, surface, _triple(first), point_kind, point=point),
+        InterfaceCoordinate(label + NORMAL, surface, _triple(second), point_kind, point=point),
     ]
     if kind == "node":
         return motion
     axis = _triple(np.cross(first, second))
-    return [*motion, InterfaceCoordinate(label + ROTATION, one, axis, own, "rotation")]
+    return [*motion, InterfaceCoordinate(label + ROTATION, surface, axis, point_kind, "rotation")]
 
 
 def normal_direction(matrices: SystemMatrices, facets: str | Sequence[str]) -> tuple[float, float, float]:
     """Return the normal of a patch of facets, with the same sign for walls that face each other.
 
-    Its largest component is positive, the first of those within a tenth of the largest. Raises InterfaceError for a
+    Its largest component is positive, the first of all within a tenth of the largest. Raises InterfaceError for a
     patch without a normal, such as a node set or a closed surface.
     """
     normal = np.array(outward_normal(matrices, facets))
@@ -227,7 +227,7 @@ class Interface(Displayed):
     def restrict(self, matrices: SystemMatrices) -> tuple[sparse.csr_array, sparse.csr_array, np.ndarray]:
         """Return stiffness (n, n), mass (n, n) and functionals (n, k) in the motions that are left to the structure.
 
-        Those are what the supports left when the interface was made, also where `matrices` has others.
+        They are the motions left by the supports when the interface was made, even if `matrices` has other supports.
         """
         free = self.motions.nonzero()[0]
 
@@ -282,7 +282,7 @@ def _rotation(matrices: SystemMatrices, coordinate: InterfaceCoordinate, axis: n
 
 
 def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordinate]) -> np.ndarray:
-    """Return the sorted DOFs of all nodes of patches of kind "full", without those at the supports."""
+    """Return the sorted DOFs of all nodes of patches of kind "full", except at the supports."""
     full = {item.facets: item.label for item in coordinates if item.kind == "full"}
     nodes = np.unique(np.concatenate([np.empty(0, np.int64), *(matrices.patch(facets).nodes for facets in full)]))
     dofs = np.setdiff1d((3 * nodes[:, None] + np.arange(3)).ravel(), matrices.fixed)
@@ -295,16 +295,16 @@ def _full_dofs(matrices: SystemMatrices, coordinates: Sequence[InterfaceCoordina
 def _motions(matrices: SystemMatrices, rigid: Sequence[str | tuple[str, ...]]) -> sparse.csr_array:
     """Return columns for the free DOFs outside rigid patches, then for the motions that the patches can make.
 
-    A single patch makes up to six. Patches with common nodes make those in which these move with both, such as the
-    rotation about a common edge; a patch with nodes at the supports those in which the supports stay at rest.
+    A single patch has up to six. Patches with common nodes have only motions in which these nodes move with both
+    patches, such as the rotation about a common edge. Where a patch has nodes at the supports, these stay at rest.
     """
     free = np.zeros(matrices.size, dtype=bool)
     free[matrices.free] = True
-    rest, count, blocks = free.copy(), np.zeros(matrices.size), []
+    outside, count, blocks = free.copy(), np.zeros(matrices.size), []
     for facets in rigid:
         patch, _, offsets = _around(matrices, facets)
         dofs = (3 * patch.nodes[:, None] + np.arange(3)).ravel()
-        rest[dofs] = False
+        outside[dofs] = False
         count[dofs] += 1.0
         basis = rigid_basis(offsets)
         columns = np.tile(np.arange(basis.shape[1]), len(dofs))
@@ -312,7 +312,7 @@ def _motions(matrices: SystemMatrices, rigid: Sequence[str | tuple[str, ...]]) -
         blocks.append(sparse.csr_array((basis.ravel(), (np.repeat(dofs, basis.shape[1]), columns)), shape=shape))
     if np.any(count > 1.0) or np.any(count[~free]):
         blocks = [_joined(blocks, count, free)]
-    others = np.flatnonzero(rest)
+    others = np.flatnonzero(outside)
     identity = sparse.csr_array((np.ones(others.size), (others, np.arange(others.size))), (matrices.size, others.size))
     return sparse.csr_array(sparse.hstack([identity, *blocks]))
 
@@ -329,14 +329,14 @@ def _joined(blocks: Sequence[sparse.csr_array], count: np.ndarray, free: np.ndar
     # every patch's motion of a tied DOF is the mean of the patches', zero at supports
     gaps, start = [], 0
     for block in blocks:
-        own = np.zeros((tied.size, every.shape[1]))
-        own[:, start : start + block.shape[1]] = block[tied].toarray()
-        inside = own.any(axis=1)
-        gaps.append(own[inside] - mean[tied[inside]].toarray())
+        motions = np.zeros((tied.size, every.shape[1]))
+        motions[:, start : start + block.shape[1]] = block[tied].toarray()
+        inside = motions.any(axis=1)
+        gaps.append(motions[inside] - mean[tied[inside]].toarray())
         start += block.shape[1]
     _, singular, right = np.linalg.svd(np.linalg.qr(np.concatenate(gaps), mode="r"))
-    left = right[np.count_nonzero(singular > _STRAIGHT * singular[0]) :].T
-    return sparse.csr_array(mean @ left)
+    compatible = right[np.count_nonzero(singular > _STRAIGHT * singular[0]) :].T
+    return sparse.csr_array(mean @ compatible)
 
 
 def rigid_motions(offsets: np.ndarray) -> np.ndarray:

@@ -37,8 +37,8 @@ def with_outputs(
     before = () if model.output_rows is None else tuple(model.output_rows)
     static = None
     if residual or model.output_residual is not None:
-        known = np.zeros((len(before), len(none))) if model.output_residual is None else model.output_residual
-        static = np.vstack([known, *((residual or {}).get(name, none) for name in rows)])
+        existing = np.zeros((len(before), len(none))) if model.output_residual is None else model.output_residual
+        static = np.vstack([existing, *((residual or {}).get(name, none) for name in rows)])
     return replace(
         model, outputs=(*model.outputs, *rows), output_rows=np.vstack([*before, *rows.values()]), output_residual=static
     )
@@ -74,7 +74,7 @@ def with_stresses(
 
 
 def hot_spots(model: ReducedModel) -> dict[str, dict[str, Any]]:
-    """Return what the model's provenance has of the places with outputs of all six components: name -> facts.
+    """Return the data in the provenance on places with outputs of all six components: name -> facts.
 
     coordinates (m), group (of the mesh's volumes), mode (that has its hot spot there: "number", from 1,
     "frequency_hz", and the next), per_amplitude ("at", "von_mises": Pa/m of the first mode, "error": estimated,
@@ -82,15 +82,15 @@ def hot_spots(model: ReducedModel) -> dict[str, dict[str, Any]]:
     "temperature"), static_error (by cause, of von Mises stress in the same unit), singular (the singular point of
     elasticity that it is at), fatigue (data of the material); each where it is known.
     """
-    known, names = model.provenance.get("hot_spots", {}), [name.rpartition(".") for name in model.outputs]
-    places = dict.fromkeys(place for place, _, component in names if component == COMPONENTS[0])
-    found = {}
-    for place in places:
-        if {f"{place}.{component}" for component in COMPONENTS} <= set(model.outputs):
-            facts = known.get(place, {})
-            # of files before version 0.3 the coordinates only
-            found[place] = dict(facts) if isinstance(facts, Mapping) else {"coordinates": list(facts)}
-    return found
+    recorded, names = model.provenance.get("hot_spots", {}), [name.rpartition(".") for name in model.outputs]
+    spots = dict.fromkeys(spot for spot, _, component in names if component == COMPONENTS[0])
+    facts_of = {}
+    for spot in spots:
+        if {f"{spot}.{component}" for component in COMPONENTS} <= set(model.outputs):
+            facts = recorded.get(spot, {})
+            # files before version 0.3 have only coordinates
+            facts_of[spot] = dict(facts) if isinstance(facts, Mapping) else {"coordinates": list(facts)}
+    return facts_of
 
 
 def shown_modes(provenance: Mapping[str, Any]) -> list[tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""ReducedModel: small dense M, C, K with labelled interface coordinates. The coupling sees nothing else of a structure.
+"""ReducedModel: small dense M, C, K with labelled interface coordinates: all that coupling uses of a structure.
 
 Needs numpy, scipy and the record store only: users of another code start with `ReducedModel.from_matrices`.
 """
@@ -88,9 +88,9 @@ class ReducedModel(Record):
     """of interface coordinates that are rotations (rad) the radius of gyration of their patch, zeros for displacements;
     None: all are displacements"""
     centrifugal_stiffness: Annotated[np.ndarray | None, Array(_SQUARE, "kg")] = None
-    """what a squared speed (rad/s) adds to the stiffness; None: does not rotate"""
+    """added stiffness per squared speed (rad/s); None: does not rotate"""
     higher_stiffness: Annotated[np.ndarray | None, Array(("power", *_SQUARE), "N/m")] = None
-    """what the 4th, 6th, ... power of the speed over the greatest adds; or None"""
+    """added stiffness per 4th, 6th, ... power of the speed over the greatest; or None"""
     rotation_axis: Annotated[np.ndarray | None, Array(("axis",))] = None
     """unit vector, with rotation_point the axis that it rotates about; or None"""
     rotation_point: Annotated[np.ndarray | None, Array(("axis",), "m")] = None
@@ -135,8 +135,8 @@ class ReducedModel(Record):
         if damping_ratio is not None:
             check_mass(mass)
             damping = modal_damping(mass, stiffness, damping_ratio)
-        known = dict(directions or {})
-        unknown = sorted(set(known) - set(interface))
+        vectors = dict(directions or {})
+        unknown = sorted(set(vectors) - set(interface))
         if unknown:
             raise ReducedModelError(
                 f"directions: no interface coordinate {unknown[0]!r}; there are: {', '.join(interface)}"
@@ -147,14 +147,14 @@ class ReducedModel(Record):
             stiffness=stiffness,
             interface=tuple(interface),
             selection=np.reshape(rows, (-1, size)),
-            directions=np.array([known.get(label, (0.0, 0.0, 0.0)) for label in interface]).reshape(-1, 3),
+            directions=np.array([vectors.get(label, (0.0, 0.0, 0.0)) for label in interface]).reshape(-1, 3),
             base_load=np.zeros((size, 3)) if base_load is None else base_load,
             damping_ratio=damping_ratio,
             **others,
         )
 
     def shown(self) -> dict[str, Any]:
-        """Return what a model prints: the frequencies first."""
+        """Return the printed summary of a model, the frequencies first."""
         first = ", ".join(f"{frequency:.6g}" for frequency in self.natural_frequencies_hz[:_SHOWN])
         return {"frequencies_hz": first + ", ..." * (self.size > _SHOWN)} | super().shown()
 
@@ -217,7 +217,7 @@ class ReducedModel(Record):
 
     @property
     def lengths(self) -> np.ndarray:
-        """(k,) m or 1, what makes displacements of the interface coordinates: the arms of rotations, 1 of others."""
+        """(k,) m or 1, factors from interface coordinates to displacements: the arms of rotations, 1 otherwise."""
         arms = np.zeros(len(self.interface)) if self.arms is None else self.arms
         return np.where(arms > 0.0, arms, 1.0)
 
@@ -340,13 +340,13 @@ class ReducedModel(Record):
         return self.interface.index(label)
 
 
-def _row(label: str, given: Any, size: int) -> Any:
+def _row(label: str, coordinate: Any, size: int) -> Any:
     """Return the row (size,) of a coordinate's number; a row as it is."""
-    if not isinstance(given, int | np.integer):
-        return given
-    if not 0 <= given < size:
+    if not isinstance(coordinate, int | np.integer):
+        return coordinate
+    if not 0 <= coordinate < size:
         raise ReducedModelError(f"interface: {label!r}: expected the number of a coordinate, 0 to {size - 1}")
-    return np.eye(size)[given]
+    return np.eye(size)[coordinate]
 
 
 def _with_residual(values: np.ndarray, residual: np.ndarray | None, forces: np.ndarray | None) -> np.ndarray:
@@ -372,10 +372,13 @@ def _checked(model: ReducedModel) -> dict[str, Any]:
     }
     required = {*_REQUIRED, *(["coordinates"] if nodes else []), *(["output_rows"] if model.outputs else [])}
     for name, (_, layout) in declared(ReducedModel).items():
-        given = getattr(model, name)
-        if isinstance(layout, Array) and layout.dtype is float and (given is not None or name in required):
-            shape, mirrored = tuple(lengths[one] for one in layout.dims), layout.dims in (_SQUARE, _COMPLIANCE)
-            values[name] = symmetric(name, given, shape[0]) if mirrored else shaped(name, given, shape)
+        value = getattr(model, name)
+        if isinstance(layout, Array) and layout.dtype is float and (value is not None or name in required):
+            shape, mirrored = (
+                tuple(lengths[dimension] for dimension in layout.dims),
+                layout.dims in (_SQUARE, _COMPLIANCE),
+            )
+            values[name] = symmetric(name, value, shape[0]) if mirrored else shaped(name, value, shape)
     check_mass(values["mass"])
     values["directions"] = unit(values["directions"])
     return values

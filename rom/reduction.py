@@ -38,7 +38,7 @@ def reduce(
     Raises ReductionError for an unknown basis, and as bases.craig_bampton.reduce and bases.free_interface.reduce_free
     do.
     """
-    found = basis_named(basis)
+    reduction = basis_named(basis)
     if not isinstance(interface, Interface):
         interface = Interface.on_patches(matrices, interface)
-    return found.reduce(matrices, interface, modes, factorize, keep_recovery, quasi_static, characteristic)
+    return reduction.reduce(matrices, interface, modes, factorize, keep_recovery, quasi_static, characteristic)

@@ -2,9 +2,9 @@
 
 The basis joins Craig-Bampton bases at several speeds, each from one factorisation. The constraint modes at
 standstill move the interface; at other speeds these modes, and the fixed-interface and quasi-static modes there,
-differ from those at standstill by motions that leave the interface at rest. Of these differences a basis, orthogonal to
-the modes at standstill in strain energy, is added to the constraint modes: every smaller model (rom.truncation) keeps
-it. The stiffness is almost linear in the squared speed, so that a few speeds are enough, spaced evenly in its square.
+differ by motions that leave the interface at rest. A basis of these differences, orthogonal to the modes at standstill
+in strain energy, is added to the constraint modes: every smaller model (rom.truncation) keeps it. The stiffness is
+almost linear in the squared speed, so that a few speeds are enough, spaced evenly in its square.
 
 The error between the speeds of the basis is estimated halfway (in the square), by the gain of the model from
 the basis of that speed, which is exact there but for the modes cut off at every speed.
@@ -57,16 +57,16 @@ class SpeedBases:
     factorize: Factorize = superlu
     quasi_static: int = 1
     characteristic: int = 6
-    _found: dict[float, Basis] = field(default_factory=dict)
+    _bases: dict[float, Basis] = field(default_factory=dict)
 
     def at(self, speed: float) -> Basis:
         """Return the basis at a speed. Raises ReductionError as bases.craig_bampton.reduce does."""
-        if speed not in self._found:
-            self._found[speed] = craig_bampton.basis_of(
+        if speed not in self._bases:
+            self._bases[speed] = craig_bampton.basis_of(
                 self._matrices(speed), self.interface, self.modes, self.factorize, self.quasi_static,
                 self.characteristic,
             )  # fmt: skip
-        return self._found[speed]
+        return self._bases[speed]
 
     def model_at(self, speed: float) -> ReducedModel:
         """Return the model of one speed only, with all modes and blocks."""
@@ -98,7 +98,7 @@ class SpeedBases:
         return model
 
     def neglected(self, model: ReducedModel, speeds: Sequence[float], modes: int, count: int) -> float:
-        """Return the relative error of the lowest frequencies for what the matrices neglect between their speeds.
+        """Return the relative error of the lowest frequencies, due to terms neglected between the matrices' speeds.
 
         model: `model` of the same speeds and modes.
         """
@@ -118,19 +118,23 @@ class SpeedBases:
         count = len(self.interface.labels)
         first = self.at(speeds[0])
         constraint, blocks, fixed = first.constraint, first.blocks[:1], first.fixed[:, :modes]
-        known = [orthonormal(np.hstack([constraint[:, count:], *blocks, fixed]), stiffness)]
+        bases = [orthonormal(np.hstack([constraint[:, count:], *blocks, fixed]), stiffness)]
         energy = np.einsum("ij,ij->j", constraint[:, :count], stiffness @ constraint[:, :count])
         fields = []
         for speed in speeds[1:]:
-            other = self.at(speed)
-            held = np.hstack([other.constraint[:, count:], *other.blocks[:1], other.fixed[:, :modes]])
-            fields.append((other.constraint - constraint)[:, :count] / np.sqrt(energy))
-            fields.append(held / np.sqrt(np.einsum("ij,ij->j", held, stiffness @ held)))
-        rest = orthogonal(np.hstack(fields), stiffness, known)
-        shares, turns = np.linalg.eigh(rest.T @ (stiffness @ rest))
-        own = rest @ (turns[:, shares > _OWN_SHARE] / np.sqrt(shares[shares > _OWN_SHARE]))
-        turned = linalg.eigh(own.T @ (stiffness @ own), own.T @ (mass @ own))[1] if own.size else np.eye(0)
-        added = own @ turned
+            basis = self.at(speed)
+            motions = np.hstack([basis.constraint[:, count:], *basis.blocks[:1], basis.fixed[:, :modes]])
+            fields.append((basis.constraint - constraint)[:, :count] / np.sqrt(energy))
+            fields.append(motions / np.sqrt(np.einsum("ij,ij->j", motions, stiffness @ motions)))
+        residual = orthogonal(np.hstack(fields), stiffness, bases)
+        shares, vectors = np.linalg.eigh(residual.T @ (stiffness @ residual))
+        independent = residual @ (vectors[:, shares > _OWN_SHARE] / np.sqrt(shares[shares > _OWN_SHARE]))
+        turned = (
+            linalg.eigh(independent.T @ (stiffness @ independent), independent.T @ (mass @ independent))[1]
+            if independent.size
+            else np.eye(0)
+        )
+        added = independent @ turned
         return Basis(np.hstack([constraint, added * column_signs(added)]), blocks, fixed)
 
 

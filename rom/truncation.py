@@ -37,18 +37,18 @@ def truncated(model: ReducedModel, modes: int, blocks: int | None = None) -> Red
         return _free_truncated(model, modes, blocks)
     lead = model.size - model.modes - sum(model.blocks) + sum(model.blocks[:blocks])
     first = model.size - model.modes
-    kept = np.r_[0:lead, first : first + modes]
-    return model.projected(np.eye(model.size)[:, kept], fixed_interface_modes=modes, blocks=model.blocks[:blocks])
+    retained = np.r_[0:lead, first : first + modes]
+    return model.projected(np.eye(model.size)[:, retained], fixed_interface_modes=modes, blocks=model.blocks[:blocks])
 
 
 def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedModel:
     """Drop free-interface modes beyond `modes`, and rebuild the blocks in the space of the dropped ones."""
     first = model.size - model.free_modes
-    kept = np.arange(first, first + modes)
-    dropped = np.setdiff1d(np.arange(model.size), kept)
+    retained = np.arange(first, first + modes)
+    dropped = np.setdiff1d(np.arange(model.size), retained)
     changes: dict[str, Any] = {"free_modes": modes, "blocks": ()}
     inertia, rigidity = (matrix[np.ix_(dropped, dropped)] for matrix in (model.mass, model.stiffness))
-    own: list[np.ndarray] = []
+    attachments: list[np.ndarray] = []
     if (blocks or model.residual_flexibility is not None) and dropped.size:
         check_elastic(count_rigid_motions(rigidity, *spectrum(inertia, rigidity)), 0)
         try:
@@ -60,14 +60,14 @@ def _free_truncated(model: ReducedModel, modes: int, blocks: int) -> ReducedMode
             lost = np.zeros((model.size, len(model.interface)))
             lost[dropped] = static
             changes |= residual_fields(model, lost)
-        own = krylov(static, partial(np.linalg.solve, rigidity), inertia, blocks)
-    basis = np.zeros((model.size, sum(block.shape[1] for block in own) + modes))
-    if own:
-        basis[dropped, : basis.shape[1] - modes] = np.hstack(own)
-    basis[kept, basis.shape[1] - modes :] = np.eye(modes)
+        attachments = krylov(static, partial(np.linalg.solve, rigidity), inertia, blocks)
+    basis = np.zeros((model.size, sum(block.shape[1] for block in attachments) + modes))
+    if attachments:
+        basis[dropped, : basis.shape[1] - modes] = np.hstack(attachments)
+    basis[retained, basis.shape[1] - modes :] = np.eye(modes)
     if basis.shape[1] == 0:
         raise ReducedModelError("modes: none are left, and nothing else")
-    return model.projected(basis, **(changes | {"blocks": tuple(block.shape[1] for block in own)}))
+    return model.projected(basis, **(changes | {"blocks": tuple(block.shape[1] for block in attachments)}))
 
 
 def massless(model: ReducedModel, modes: int) -> ReducedModel:
@@ -87,8 +87,8 @@ def massless(model: ReducedModel, modes: int) -> ReducedModel:
         raise ReducedModelError(f"modes: expected 1 to {model.size} (the modes of this model), not {modes}")
     check_elastic(model.rigid_modes, modes)
     static = shapes[:, modes:] / squares[modes:] @ (model.selection @ shapes[:, modes:]).T
-    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (), **_AT_ONE_SPEED}
-    return model.projected(shapes[:, :modes], **kept, **residual_fields(model, static))
+    changes = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (), **_AT_ONE_SPEED}
+    return model.projected(shapes[:, :modes], **changes, **residual_fields(model, static))
 
 
 def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
@@ -105,8 +105,8 @@ def with_attachment_modes(model: ReducedModel, modes: int) -> ReducedModel:
     dropped = shapes[:, modes:]
     static = (model.selection @ dropped).T / squares[modes:, None]
     block = orthonormal(static, np.eye(len(static)))
-    kept = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (block.shape[1],), **_AT_ONE_SPEED}
-    return model.projected(np.hstack([dropped @ block, shapes[:, :modes]]), **kept)
+    changes = {"fixed_interface_modes": 0, "free_modes": modes, "blocks": (block.shape[1],), **_AT_ONE_SPEED}
+    return model.projected(np.hstack([dropped @ block, shapes[:, :modes]]), **changes)
 
 
 def boundary_form(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vanedamp.modal.algebra import rotation, turns
+from vanedamp.modal.algebra import rotation, sector_rotations
 from vanedamp.modal.records.ring_modes import RingModes
 
 #: distance relative to the sector's size up to which nodes of two sectors are merged
@@ -53,7 +53,8 @@ def whole_ring(modes: RingModes, coordinates: np.ndarray, cells: np.ndarray) -> 
     numbers[:, on_axis] = on_axis
     unique, inverse = np.unique(numbers, return_inverse=True)
     sector, node = np.divmod(unique, count)
-    points = np.einsum("sij,nj->sni", turns(modes.axis, sectors), coordinates - modes.point)[sector, node] + modes.point
+    turned = np.einsum("sij,nj->sni", sector_rotations(modes.axis, sectors), coordinates - modes.point)
+    points = turned[sector, node] + modes.point
     return WholeRing(sector, node, points, inverse.reshape(sectors, count)[:, cells].reshape(-1, cells.shape[1]))
 
 

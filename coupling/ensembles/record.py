@@ -16,7 +16,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import dimension, resonance_axis
 from vanedamp.coupling.sweep.over_axes import OverAxes
-from vanedamp.files.record import Array, Columns, Paths
+from vanedamp.files.record import Array, NamedArrays, Paths
 
 #: numbers that a sentence names, of the spread's
 _NAMED = 3
@@ -68,16 +68,16 @@ class Ensemble(OverAxes):
     """dotted path -> values, of its [sweep] table; empty for a run at one frequency"""
     samples: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of, "sample", "number")]
     """dotted path -> (s,) values of each range"""
-    members: Annotated[Mapping[str, np.ndarray], Columns(kept, ("sample", "grid"))]
+    members: Annotated[Mapping[str, np.ndarray], NamedArrays(kept, ("sample", "grid"))]
     """(s, *grid) quantities of all points (results.md), of bodies, hot spots and sectors the largest; nan where
     none is"""
     status: Annotated[np.ndarray, Array(("sample", "grid"), dtype=object)]
     """of every point, as in a Sweep"""
-    quantile: Annotated[Mapping[str, np.ndarray], Columns(spreads, ("quantile",), "quantile_")]
+    quantile: Annotated[Mapping[str, np.ndarray], NamedArrays(spreads, ("quantile",), "quantile_")]
     """(5, ...) quantiles QUANTILES over the samples of points that are ok: of quantities over the grid, and over its
     axes other than the frequency or the speed of a curve: `peak_amplitude`, its highest mean [m], `reduction`, the
     reduction of the maximum without bodies, and the highest stress, wear and so on"""
-    indices: Annotated[Mapping[str, np.ndarray], Columns(_fractions, ("index", "number"), "indices_")]
+    indices: Annotated[Mapping[str, np.ndarray], NamedArrays(_fractions, ("index", "number"), "indices_")]
     """(4, d, ...) Sobol' indices INDICES of those results that have any: the fraction of the variance that a parameter
     causes without and with interactions, and half widths of their 95 % confidence intervals; nan without spread"""
     provenance: Mapping[str, Any] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from vanedamp.coupling.scene.contact_laws.compliant import Compliant
 from vanedamp.coupling.scene.scene import Scene, Time
 from vanedamp.coupling.scene.solver_options import options_of
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.rom.contact_pulse import Collision, Pulse
+from vanedamp.rom.contact_pulse import Pulse, WallContact
 
 # of the impulse and of the duration; a softer spring takes its square root longer
 _LESS, _LONGER = 0.8, 2.0
@@ -26,7 +26,7 @@ _PLASTIC = 0.05
 def sensitivity(
     scene: Scene,
     frequencies: Sequence[float],
-    collision: Collision,
+    collision: WallContact,
     wall: float,
     pulse: Pulse,
     modes: int,

@@ -31,7 +31,7 @@ from vanedamp.coupling.system.body_loads import load_warnings
 from vanedamp.coupling.system.reduced_model_file import greatest_speed, reduced_model
 from vanedamp.coupling.system.resonance import excitation_force
 from vanedamp.files.toml_input import InputError
-from vanedamp.rom.contact_pulse import Collision, pulse
+from vanedamp.rom.contact_pulse import WallContact, pulse
 from vanedamp.rom.dense_modes import spectrum
 from vanedamp.rom.error_estimate import Choice, Rung, choose, frequency_grid, natural_ladder, rigid_errors, worst_rungs
 from vanedamp.rom.recovery import SHOWN, shown_modes
@@ -294,7 +294,7 @@ def _ladders(
         size = min(_finest(scene, model).size for scene in scenes)
         return _Ladders(rigid, ([Rung(size, size, 0.0, 0.0)], [Rung(size, size, 0.0, 0.0)]))
 
-    def collisions(smaller: ReducedModel) -> list[Collision]:
+    def collisions(smaller: ReducedModel) -> list[WallContact]:
         if any(scene.contact.needs_residual_flexibility for scene in scenes) and not _yields(smaller):
             return []  # it has no boundary without mass
         return list(dict.fromkeys(item for scene in scenes for item in _collisions(scene, smaller)))
@@ -396,7 +396,7 @@ def _undamped(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> flo
     return force * float(np.abs(_waves(scene, model, frequencies)).max())
 
 
-def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
+def _collisions(scene: Scene, model: ReducedModel) -> list[WallContact]:
     """Return the contacts of bodies with walls on a model; none for rigid contacts. Raises InputError."""
     if scene.contact.rigid:
         return []
@@ -409,7 +409,7 @@ def _collisions(scene: Scene, model: ReducedModel) -> list[Collision]:
             reduced = 1.0 / (1.0 / damper.mass + float(model.row(label) @ first) ** 2)
             lost = float(own[model.interface.index(label)])
             element = scene.contact.element(damper.restitution, reduced, lost)
-            found.append(Collision(label, damper.mass, element.stiffness, element.dashpot))
+            found.append(WallContact(label, damper.mass, element.stiffness, element.dashpot))
     return found
 
 

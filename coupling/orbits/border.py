@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Measured, table
-from vanedamp.files.record import Array, Columns, Rows, Unit, declared, joined
+from vanedamp.files.record import Array, NamedArrays, NumberUnit, RecordRows, declared, joined
 from vanedamp.files.store import frozen
 
 
@@ -25,7 +25,7 @@ class NamedPoint:
     """more on that"""
     state: Annotated[np.ndarray, Array(("coordinate",))]
     """(k,) at the start of the period"""
-    parameter: Annotated[float, Unit("parameter")]
+    parameter: Annotated[float, NumberUnit("parameter")]
     """the branches' number"""
 
 
@@ -43,7 +43,7 @@ class Curve(Measured):
         np.ndarray, Array(("point", "multiplier"), dtype=complex, name="multiplier", imaginary="_imag")
     ]
     """(m, k) complex, the largest first"""
-    quantities: Annotated[Mapping[str, np.ndarray], Columns(table, ("point",))]
+    quantities: Annotated[Mapping[str, np.ndarray], NamedArrays(table, ("point",))]
     """(m, ...) by name, over an orbit's own periods; nan where they are unknown (orbit_quantities)"""
 
     @classmethod
@@ -82,7 +82,7 @@ def stacked(points: Sequence[Mapping[str, Any]]) -> dict[str, np.ndarray]:
 class BorderPoint(NamedPoint):
     """A named point of a border: of codimension two, a change of the event sequence, an extremum."""
 
-    second: Annotated[float, Unit("second")]
+    second: Annotated[float, NumberUnit("second")]
     """the second one"""
 
 
@@ -105,7 +105,7 @@ class Border(Curve):
     too; of a grazing border, those without the impact only; of a Neimark-Sacker border, the orbit without its torus"""
     stable_orbits: Annotated[np.ndarray, Array(("point", "side"), dtype=int)]
     """(m, 2) how many of them are stable"""
-    special: Annotated[tuple[BorderPoint, ...], Rows("special")]
+    special: Annotated[tuple[BorderPoint, ...], RecordRows("special")]
     """its named points"""
     ends: Annotated[tuple[str, str], Array(("border_side",), dtype=object, name="end")]
     """why it was not followed further, at its first and its last point"""

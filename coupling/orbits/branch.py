@@ -16,7 +16,7 @@ from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_alo
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Ragged, Record, Rows, joined
+from vanedamp.files.record import Array, Ragged, Record, RecordRows, joined
 
 
 class SpecialPoint(NamedPoint):
@@ -37,7 +37,7 @@ class Branch(Curve):
     """(m,) whether an orbit is its own mirror image half a period later"""
     undetermined: Annotated[np.ndarray, Array(("point",), dtype=bool)]
     """(m,) whether stability is open: events meet or graze, and multipliers hold on one side only"""
-    special: Annotated[tuple[SpecialPoint, ...], Rows("special")]
+    special: Annotated[tuple[SpecialPoint, ...], RecordRows("special")]
     """bifurcations, changes of the sequence, and the end"""
     end: str
     """why it was not followed further"""

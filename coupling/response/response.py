@@ -20,7 +20,7 @@ from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.response.spot_stress import SpotStress
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Named, Own, Record, Rows, Unit, Within, declared, empty
+from vanedamp.files.record import Array, Named, NumberUnit, Own, Record, RecordRows, Within, declared, empty
 from vanedamp.files.store import Variable, frozen
 from vanedamp.files.toml_input import validate
 from vanedamp.rom.recovery import COMPONENTS
@@ -69,7 +69,7 @@ class Status(StrEnum):
 class Event:
     """One event. Speeds are relative to the wall or body met; of planar bodies and at stops, of the gap."""
 
-    time: Annotated[float, Unit("s")]
+    time: Annotated[float, NumberUnit("s")]
     """time"""
     kind: str
     """what happened: "impact"; "stick" and "slip" on the floor or of a friction damper; "rest" at a wall or a
@@ -79,17 +79,17 @@ class Event:
     side: str
     """"left", "right" (walls), "body" (the next body to the right), "floor", "ceiling"; "casing" for a friction damper,
     "stop" for a stop; of other elements the name of their table"""
-    relative_velocity_before: Annotated[float, Unit("m/s")]
+    relative_velocity_before: Annotated[float, NumberUnit("m/s")]
     """relative speed before"""
-    relative_velocity_after: Annotated[float, Unit("m/s")]
+    relative_velocity_after: Annotated[float, NumberUnit("m/s")]
     """relative speed after"""
-    impulse: Annotated[float, Unit("N s")]
+    impulse: Annotated[float, NumberUnit("N s")]
     """impulse along the normal"""
     corner: int = -1
     """corner of a body, from 0 (of a block 0 to 3) counterclockwise from the lower left one; -1: none"""
-    tangential_impulse: Annotated[float, Unit("N s")] = 0.0
+    tangential_impulse: Annotated[float, NumberUnit("N s")] = 0.0
     """impulse of friction"""
-    loss: Annotated[float, Unit("J")] = 0.0
+    loss: Annotated[float, NumberUnit("J")] = 0.0
     """energy that the impulses of an impact take, without the completion of a chatter"""
 
 
@@ -185,7 +185,7 @@ class Response(Measured, Record, Plotted):
     """displacements of the bodies relative to their cavities at the start of each period"""
     slip_velocity: Annotated[np.ndarray, Array(("period", "damper"), "m/s")]
     """velocities of the bodies relative to their cavities there"""
-    event_list: Annotated[Sequence[Event], Rows("event")] = ()
+    event_list: Annotated[Sequence[Event], RecordRows("event")] = ()
     """events, empty if they were not asked for"""
     time: Annotated[np.ndarray, Array(("time",), "s")] = field(default_factory=empty)
     """of the samples, empty if none were asked for"""

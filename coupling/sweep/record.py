@@ -20,7 +20,7 @@ from vanedamp.coupling.sweep.grid import dimension
 from vanedamp.coupling.sweep.over_axes import OverAxes
 from vanedamp.coupling.sweep.row import TEXTS
 from vanedamp.files.display import html_table
-from vanedamp.files.record import Array, Columns, Paths
+from vanedamp.files.record import Array, NamedArrays, Paths
 
 #: amplitudes that earlier files have of bodies without static loads only, which they are then as well
 _ALSO_DYNAMIC = (amplitude_max.name, amplitude_mean.name)
@@ -58,13 +58,13 @@ class Sweep(Measured, OverAxes):
     """of the sweep, with its [sweep] table"""
     axes: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of)]
     """dotted path -> values"""
-    quantities: Annotated[Mapping[str, np.ndarray], Columns(_of_points, ("grid",), in_json=_in_json)]
+    quantities: Annotated[Mapping[str, np.ndarray], NamedArrays(_of_points, ("grid",), in_json=_in_json)]
     """by name; sections are those of the last evaluated periods"""
     status: Annotated[np.ndarray, Array(("grid",), dtype=object)]
     """"ok", another response.response.Status, or "error: ..." for a run that broke, without quantities"""
     classification: Annotated[np.ndarray, Array(("grid",), dtype=object)]
     """as in a Response"""
-    peaks: Annotated[Mapping[str, np.ndarray], Columns(_peaks, ("curves",))] = field(default_factory=dict)
+    peaks: Annotated[Mapping[str, np.ndarray], NamedArrays(_peaks, ("curves",))] = field(default_factory=dict)
     """family `linear_peaks`, over the axes other than the frequency, or the speed along an engine order; empty for a
     sweep at one frequency"""
     provenance: Mapping[str, Any] = field(default_factory=dict)

@@ -16,7 +16,7 @@ from vanedamp.coupling.response.spot_stress import scalars, stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
 from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Columns, Record
+from vanedamp.files.record import Array, NamedArrays, Record
 from vanedamp.files.store import Variable
 
 #: energies of a ring-down: at its start, lost, and at its end
@@ -94,9 +94,11 @@ class RingDown(Measured, Record, Plotted):
     strength: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """utilisation and damage of the motion, by hot spot (strength.assessment)"""
 
-    quantities: Annotated[Mapping[str, Any], Columns(table)] = field(default_factory=dict)
+    quantities: Annotated[Mapping[str, Any], NamedArrays(table)] = field(default_factory=dict)
     """of the whole free motion, by name; what is not known, or has no meaning without an excitation, is left out"""
-    course: Annotated[Mapping[str, np.ndarray], Columns(table, ("period",), "period_")] = field(default_factory=dict)
+    course: Annotated[Mapping[str, np.ndarray], NamedArrays(table, ("period",), "period_")] = field(
+        default_factory=dict
+    )
     """(p, ...) the same of each of the periods of `duration`"""
 
     @property

@@ -17,7 +17,19 @@ from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
 from docs._ext.toml_keys import table_node, with_literals
-from vanedamp.files.record import Array, Columns, Named, Paths, Ragged, Record, Rows, Sparse, Unit, Within, declared
+from vanedamp.files.record import (
+    Array,
+    Named,
+    NamedArrays,
+    NumberUnit,
+    Paths,
+    Ragged,
+    Record,
+    RecordRows,
+    SparseMatrix,
+    Within,
+    declared,
+)
 from vanedamp.files.reference import unit_in
 from vanedamp.studies import kinds
 
@@ -79,19 +91,19 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
         text = _SHAPE.sub("", texts.get(one, _EVERYWHERE.get(one, "")))
         if isinstance(layout, Within):
             found += described((get_args(kind) or (kind,))[0])
-        elif isinstance(layout, Rows):
+        elif isinstance(layout, RecordRows):
             found += [
                 row._replace(name=f"{layout.dim}_{row.name}", dims=", ".join(filter(None, (layout.dim, row.dims))))
                 for row in described(get_args(kind)[0])
             ]
         elif isinstance(layout, Ragged):
             found += _of_parts(get_args(kind)[0], layout)
-        elif isinstance(layout, Columns):
+        elif isinstance(layout, NamedArrays):
             found.append(Described(f"{layout.prefix}QUANTITY", ", ".join((*layout.dims, "...")), "", text))
         elif isinstance(layout, Paths):
             name = f"{layout.dim}_AXIS" if layout.dim else "AXIS"
             found.append(Described(name, layout.dim or "AXIS", "", text))
-        elif isinstance(layout, Sparse):
+        elif isinstance(layout, SparseMatrix):
             found += [
                 Described(one, f"{one}_entry", layout.unit, f"entries of the matrix {text}"),
                 Described(f"{one}_column", f"{one}_entry", "", "their columns, from 0"),
@@ -102,7 +114,7 @@ def described(record: type, names: Sequence[str] = ()) -> list[Described]:
             own = ", ".join((layout.name or one) + part for part in parts)
             found.append(Described(own, ", ".join(layout.dims), _unit(layout), text))
         else:
-            unit = _unit(layout) if isinstance(layout, Array | Unit) else unit_in(text) or ""
+            unit = _unit(layout) if isinstance(layout, Array | NumberUnit) else unit_in(text) or ""
             name = layout.name if isinstance(layout, Named) else one
             found.append(Described(name, "", unit, text.removesuffix(f"[{unit}]").rstrip()))
     return found
@@ -114,8 +126,8 @@ def _of_parts(part: type, ragged: Ragged) -> list[Described]:
     whose = f"index of the {thing} to which it belongs, from 0"
     found = [Described(f"{thing}_of_{dim}", prefix + dim, "", whose)]
     for name, (_, layout) in declared(part).items():
-        rows = layout.dim if isinstance(layout, Rows) else dim
-        if isinstance(layout, Rows):
+        rows = layout.dim if isinstance(layout, RecordRows) else dim
+        if isinstance(layout, RecordRows):
             found.append(Described(f"{prefix}{rows}_{thing}", prefix + rows, "", whose))
         for one in described(part, [name]):
             own = one.dims.split(", ") if one.dims else []
@@ -125,7 +137,7 @@ def _of_parts(part: type, ragged: Ragged) -> list[Described]:
     return found
 
 
-def _unit(layout: Array | Unit) -> str:
+def _unit(layout: Array | NumberUnit) -> str:
     return "" if layout.unit == "1" else layout.unit
 
 

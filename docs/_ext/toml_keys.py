@@ -19,7 +19,7 @@ from sphinx.environment import BuildEnvironment
 from sphinx.roles import XRefRole
 from sphinx.util.nodes import make_refnode
 
-from vanedamp.files.key_tables import NAME, Table, tables
+from vanedamp.files.key_tables import NAME, KeyTable, tables
 from vanedamp.studies.file_kinds import KINDS
 
 HEADER = ("Key", "Value", "Unit", "Default", "Meaning")
@@ -68,7 +68,7 @@ class Keys(Directive):
         known = {table for name in less for table in tables(KINDS[name].schema)}
         return [self._section(kind, table) for table in tables(KINDS[kind].schema) if table not in known]
 
-    def _section(self, kind: str, table: Table) -> nodes.section:
+    def _section(self, kind: str, table: KeyTable) -> nodes.section:
         env: BuildEnvironment = self.state.document.settings.env
         domain = env.domains["toml"]
         assert isinstance(domain, TomlDomain)
@@ -90,7 +90,7 @@ class Keys(Directive):
             section += table_node(HEADER, rows, (16, 20, 8, 12, 44))
         return section
 
-    def _ids(self, table: Table, key: str = "") -> list[str]:
+    def _ids(self, table: KeyTable, key: str = "") -> list[str]:
         """Return the anchors of a table or a key: that with the variant; of the first variant also that without."""
         taken = self.state.document.settings.env.temp_data.setdefault("toml_keys", set())
         plain = table._replace(variant="").anchor(key) or "top-level"

@@ -1,10 +1,10 @@
-"""Tables of measurements as text, however a laboratory's program spells them; what leaves two readings is rejected.
+"""Tables of measurements as text, in the spellings of laboratory programs; ambiguous tables are rejected.
 
-Columns stand between semicolons, tabs, commas or blanks. Numbers have decimal points or, unless commas separate
+Semicolons, tabs, commas or blanks separate columns. Numbers have decimal points or, unless commas separate
 columns, decimal commas; complex ones have an i or j. Text is UTF-8, UTF-16 or Latin-1. Data begin at the first line of
-two or more cells whose first is a number; the last line before them with as many cells names the columns, or gives
-their units below the names; the others are remarks. Lines that begin with #, %, ! or // are remarks, too, unless the
-last one before the data names its columns.
+two or more cells whose first is a number; the last earlier line with as many cells names the columns, or gives their
+units below the names; the others are remarks. Lines that begin with #, %, ! or // are remarks as well, unless the last
+one before the data names its columns.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ import numpy as np
 
 from vanedamp.files.errors import LARGEST, VanedampError
 from vanedamp.files.foreign import existing, reading
-from vanedamp.files.formats.lab_units import Unit, unit
+from vanedamp.files.formats.lab_units import LabUnit, unit
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
 _REMARK = ("#", "%", "!", "//")
-#: what headers call a column, without its unit
+#: names of columns in headers, without units
 _NAMES = {
     "frequency": r"f|freq\w*|frequen[zc]\w*|omega|ω", "time": r"t|time|zeit", "direction": "direction",
     "amplitude": r"ampl?(itude)?|(half )?swing", "displacement": r"x|displ?(acement)?|weg", "speed": "speed",
@@ -38,7 +38,7 @@ _EXAMPLES = {
     "frequency": "Hz", "time": "s", "phase": "rad", "amplitude": "m", "displacement": "m", "velocity": "m/s",
     "acceleration": "m/s^2", "force": "N", "base_acceleration": "m/s^2", "speed": "m/s",
 }  # fmt: skip
-#: what an amplitude is of, as its header says
+#: kind of an amplitude, by its header
 _KINDS = {
     "pk-pk": r"(?:pk|p|peak)(?:[-_ ]?to[-_ ]?|[-_ ]?)(?:pk|p|peak)", "rms": "rms",
     "pk": r"(?:(?:0|zero)[-_ ]?(?:to[-_ ]?)?)?(?:pk|peak)",
@@ -46,20 +46,20 @@ _KINDS = {
 
 
 class Column(NamedTuple):
-    """A column: its header, name and unit there, "rms", "pk", "pk-pk" or "" of an amplitude, its place from 0.
+    """A column: header, name and unit in it, kind of amplitude ("rms", "pk", "pk-pk" or ""), position from 0.
 
-    unknown: what the header has in brackets, if that is no unit."""
+    unknown: text in brackets in the header that is not a unit."""
 
     header: str
     name: str
-    unit: Unit | None
+    unit: LabUnit | None
     kind: str
     unknown: str
-    place: int
+    position: int
 
     @property
     def role(self) -> str:
-        """What it holds: by its name, or else by its unit; "" if neither says."""
+        """Role of the column: by its name, or else by its unit; "" if unknown."""
         word = self.name.lower().replace("_", " ")
         if self.kind and not word:
             return "amplitude"
@@ -83,7 +83,7 @@ class LabTable:
 
     def words(self, column: Column) -> list[str]:
         """Return the words (n,) of a column."""
-        return [row[column.place] for row in self.rows]
+        return [row[column.position] for row in self.rows]
 
     def numbers(self, column: Column) -> np.ndarray:
         """Return the numbers (n,) of a column as they stand, complex if one is. Raises the table's error."""
@@ -92,14 +92,16 @@ class LabTable:
             plain = np.array([float(word) for word in words])
             if np.all(np.abs(plain) <= LARGEST) and "_" not in "".join(words):
                 return plain
-        found = [number(word) for word in words]
-        for row, value in enumerate(found):
+        values = [number(word) for word in words]
+        for row, value in enumerate(values):
             if value is None or abs(value) > LARGEST:
-                what = "a finite number" if value is None else f"a number up to {LARGEST:g}"
+                expected = "a finite number" if value is None else f"a number up to {LARGEST:g}"
                 name = f"{column.header}: " if column.header else ""
-                raise self.error(f"{self.place(row)}: {name}expected {what} (got {self.rows[row][column.place]!r})")
-        values = np.array(found, complex)
-        return values if self.is_complex(column) else values.real.copy()
+                raise self.error(
+                    f"{self.place(row)}: {name}expected {expected} (got {self.rows[row][column.position]!r})"
+                )
+        array = np.array(values, complex)
+        return array if self.is_complex(column) else array.real.copy()
 
     def is_complex(self, column: Column) -> bool:
         """Whether a column holds complex numbers."""
@@ -112,14 +114,16 @@ class LabTable:
         """
         return np.asarray(self.unit_of(column, quantity, default).factor * self.numbers(column))
 
-    def unit_of(self, column: Column, quantity: str, default: str = "") -> Unit:
+    def unit_of(self, column: Column, quantity: str, default: str = "") -> LabUnit:
         """Return the unit of a column; arguments as of `si`."""
-        own = column.unit or (unit(default) if not column.unknown else None)
-        if own is not None and own.quantity == quantity and not own.decibels:
-            return own
-        what = f"no unit of {quantity}" if own else f"unknown unit {column.unknown!r}" if column.unknown else "no unit"
+        found = column.unit or (unit(default) if not column.unknown else None)
+        if found is not None and found.quantity == quantity and not found.decibels:
+            return found
+        fault = (
+            f"no unit of {quantity}" if found else f"unknown unit {column.unknown!r}" if column.unknown else "no unit"
+        )
         raise self.error(
-            f"{self.path}: {column.header!r}: {what}; write one such as '{column.name or quantity} "
+            f"{self.path}: {column.header!r}: {fault}; write one such as '{column.name or quantity} "
             f"[{_EXAMPLES[quantity]}]'"
         )
 
@@ -134,26 +138,26 @@ class LabTable:
         )
         if not any(column.header for column in self.columns):
             raise self.error(f"{self.path}: names no columns; expected the header {expected}")
-        known = {*further, *(role for roles in needed for role in roles)}
-        found: dict[str, Column] = {}
+        roles_known = {*further, *(role for roles in needed for role in roles)}
+        by_role: dict[str, Column] = {}
         for column in self.columns:
-            role = column.header if column.header in known else column.role
-            if role not in known:
+            role = column.header if column.header in roles_known else column.role
+            if role not in roles_known:
                 raise self.error(f"{self.path}: unknown column {column.header!r}; expected {expected}")
-            if role in found:
+            if role in by_role:
                 raise self.error(
-                    f"{self.path}: {found[role].header!r} and {column.header!r} are both {role}; leave one out"
+                    f"{self.path}: {by_role[role].header!r} and {column.header!r} are both {role}; leave one out"
                 )
-            found[role] = column
+            by_role[role] = column
         for roles in needed:
-            if not found.keys() & set(roles):
+            if not by_role.keys() & set(roles):
                 raise self.error(f"{self.path}: no column {_title(roles[0])}; expected {expected}")
-        return found
+        return by_role
 
     def reading(self, taken: Mapping[str, str]) -> str:
-        """Return how the file was read, in words; taken: what was made of headers."""
-        told = ", ".join(f"{key!r} as {value}" for key, value in taken.items())
-        return f"{Path(self.path).name}: {self._spelling}; {told}"
+        """Return how the file was read, in words; taken: meaning by header."""
+        roles = ", ".join(f"{key!r} as {value}" for key, value in taken.items())
+        return f"{Path(self.path).name}: {self._spelling}; {roles}"
 
 
 def _title(role: str) -> str:
@@ -196,13 +200,13 @@ def _table(path: str | os.PathLike[str], error: type[VanedampError], text: str, 
         named = [titles] if len(titles) == width and _column(titles[0], 0).role in ("frequency", "time") else []
     titles = named[-1] if named else [""] * width
     if len(named) > 1 and all(not _column(title, 0).name for title in titles):  # units below names
-        titles = [" ".join(filter(None, each)) for each in zip(*named[-2:], strict=True)]
+        titles = [" ".join(filter(None, pair)) for pair in zip(*named[-2:], strict=True)]
     if not titles[-1] and not any(row[-1] for _, row in body):  # a separator at the end of every line
         titles.pop()
     rows = [row for _, row in body]
     commas = _decimal_commas(path, error, body)
     spelling = f"{_SEPARATORS[separator]}, decimal {'commas' if commas else 'points'}, {encoding}"
-    columns = [_column(title, place) for place, title in enumerate(titles)]
+    columns = [_column(title, index) for index, title in enumerate(titles)]
     return LabTable(path, error, columns, rows, [n for n, _ in body], spelling)
 
 
@@ -221,7 +225,7 @@ def number(word: str) -> complex | None:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Return the cells of a line; those between blanks may be complex numbers with blanks around their signs."""
+    """Return the cells of a line; cells between blanks may be complex numbers with blanks around their signs."""
     if separator == " ":
         return re.sub(r"(?<=\S)\s+([-+])\s+(?=\S)|\s+(?=[ij](\s|$))", r"\1", line).split()
     return [word.strip() for word in next(csv.reader([line], delimiter=separator))]
@@ -252,30 +256,30 @@ def _titles(line: str, separator: str) -> list[str]:
     return re.findall(r"[^\s(\[]\S*(?:\s+[(\[][^)\]]*[)\]]\S*)?", line)
 
 
-def _column(header: str, place: int) -> Column:
+def _column(header: str, index: int) -> Column:
     """Return the column of a header: its unit is the longest end of it that is one."""
     text, kind = header, ""
     for name, pattern in _KINDS.items():
-        if found := re.search(rf"(?<![A-Za-z]){pattern}(?![A-Za-z])", text, re.I):
-            text, kind = f"{text[: found.start()]} {text[found.end() :]}", name
+        if match := re.search(rf"(?<![A-Za-z]){pattern}(?![A-Za-z])", text, re.I):
+            text, kind = f"{text[: match.start()]} {text[match.end() :]}", name
             break
     text = re.sub(r"[\[(]\s*[\])]", "", text).strip(" _,")
-    for cut in [0, *(found.start() for found in re.finditer(r"[\s_/,:(\[]", text))]:
+    for cut in [0, *(match.start() for match in re.finditer(r"[\s_/,:(\[]", text))]:
         end = text[cut:].strip(" ,:")
         tried = [end, end[1:]] if end[:1] in "/" else [end[1:].replace("_", "/")] if end[:1] == "_" else [end]
         if end[:1] == "[" and end[-1:] == "]":
             tried = [end[1:-1].strip(" ,")]
-        for one in tried:
-            if one and (of := unit(one)):
-                return Column(header, text[:cut].strip(" _/,:"), of, kind, "", place)
+        for candidate in tried:
+            if candidate and (of := unit(candidate)):
+                return Column(header, text[:cut].strip(" _/,:"), of, kind, "", index)
     bracket = re.fullmatch(r"(.*?)\s*([\[(])([^\])]*)[\])]", text)
     if bracket and (bracket[2] == "[" or "/" in bracket[3] or _role_alone(bracket[1])):
-        return Column(header, bracket[1], None, kind, bracket[3].strip(), place)
-    return Column(header, text, None, kind, "", place)
+        return Column(header, bracket[1], None, kind, bracket[3].strip(), index)
+    return Column(header, text, None, kind, "", index)
 
 
 def _role_alone(name: str) -> bool:
-    """Whether a name says what a column is of, and not only which part of a response."""
+    """Whether a name states the quantity of a column, not only which part of a response it is."""
     return Column("", name, None, "", "", 0).role not in ("", "real", "imaginary")
 
 

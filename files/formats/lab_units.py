@@ -24,7 +24,7 @@ _SAME = {
 _RAISED = str.maketrans("⁻⁰¹²³⁴", "-01234")
 _DECIBELS = re.compile(r"[(\[]?\s*db\b[\s,]*(?:\(?\s*re(?:f\b|l\b)?\.?:?\s*(?P<of>.+?))?\s*[)\]]?", re.I)
 _LEVEL = re.compile(r"(?P<size>\d[\d.]*(?:[eE][-+]?\d+)?)?\s*(?P<unit>.+)")
-#: what measured columns are of, by the powers of their units
+#: quantities of measured columns, by the powers of their units
 QUANTITIES: dict[tuple[int, ...], str] = {
     (0, 0, -1, 1): "frequency", (0, 0, 1, 0): "time", (0, 0, 0, 1): "phase", (0, 1, 0, 0): "displacement",
     (0, 1, -1, 0): "velocity", (0, 1, -2, 0): "acceleration", (1, 1, -2, 0): "force", (-1, 0, 2, 0): "receptance",
@@ -32,9 +32,9 @@ QUANTITIES: dict[tuple[int, ...], str] = {
 }  # fmt: skip
 
 
-class Unit(NamedTuple):
-    """A unit: what it is of, one of QUANTITIES, "" for decibels without a reference; factor: in SI, of a phase in rad,
-    of decibels that of their reference."""
+class LabUnit(NamedTuple):
+    """A unit; quantity: one of QUANTITIES, "" for decibels without a reference; factor: in SI, of a phase in rad, of
+    decibels the factor of their reference."""
 
     text: str
     quantity: str
@@ -43,15 +43,15 @@ class Unit(NamedTuple):
 
 
 @cache
-def unit(text: str) -> Unit | None:
+def unit(text: str) -> LabUnit | None:
     """Return the unit that a text is; None for none of QUANTITIES."""
     text = text.strip()
     if level := _DECIBELS.fullmatch(text):
         if level["of"] is None:
-            return Unit(text, "", 1.0, True)
+            return LabUnit(text, "", 1.0, True)
         size = _LEVEL.fullmatch(level["of"])
-        found = unit(size["unit"]) if size else None
-        return found and found._replace(text=text, factor=float(size["size"] or 1.0) * found.factor, decibels=True)  # type: ignore[index]
+        base = unit(size["unit"]) if size else None
+        return base and base._replace(text=text, factor=float(size["size"] or 1.0) * base.factor, decibels=True)  # type: ignore[index]
     plain = text.translate(_RAISED).replace("µ", "u").replace("μ", "u").replace("°", "deg")
     plain = re.sub(r"[·×]", "*", plain).replace("^", "**")
     plain = re.sub(r"(?<=[A-Za-z])(?=-?\d)", "**", plain)
@@ -61,7 +61,7 @@ def unit(text: str) -> Unit | None:
     except (SyntaxError, ValueError, KeyError, RecursionError, MemoryError):
         return None
     quantity = QUANTITIES.get(powers)
-    return quantity and Unit(text, quantity, factor * (2 * math.pi if quantity == "phase" else 1.0))  # type: ignore
+    return quantity and LabUnit(text, quantity, factor * (2 * math.pi if quantity == "phase" else 1.0))  # type: ignore
 
 
 def _product(node: ast.expr) -> tuple[float, tuple[int, ...]]:

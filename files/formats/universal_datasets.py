@@ -38,7 +38,7 @@ def pyuff() -> Any:
 
 
 def datasets(file: Path) -> list[dict[str, Any]]:
-    """Return the datasets 15, 55, 58 and 2411 of a file. Raises what pyuff raises for a damaged one."""
+    """Return the datasets 15, 55, 58 and 2411 of a file. Raises pyuff's errors for a damaged file."""
     universal = pyuff().UFF(str(file))
     kinds = universal.get_set_types()
     wanted = np.flatnonzero(np.isin(kinds, (15, 55, 58, 2411)))
@@ -99,8 +99,8 @@ def write_universal(sets: Iterable[Any], target: Path) -> None:
     """Write datasets as pyuff takes them. Raises MeasurementError without pyuff, StoreError for an unwritable file."""
     prepare = pyuff()
     with replacing(target) as temporary, temporary.open("wb") as whole, tempfile.TemporaryDirectory() as folder:
-        part = Path(folder) / "dataset.uff"
+        file = Path(folder) / "dataset.uff"
         for dataset in sets:  # each by itself: pyuff reads all of a file again for every set that it appends
-            prepare.UFF(str(part)).write_sets([dataset], "add")
-            whole.write(part.read_bytes())
-            part.unlink()
+            prepare.UFF(str(file)).write_sets([dataset], "add")
+            whole.write(file.read_bytes())
+            file.unlink()

@@ -9,24 +9,24 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Record, Rows, Unit, empty
+from vanedamp.files.record import Array, NumberUnit, Record, RecordRows, empty
 
 #: 1/min per rad/s
 RPM = 30.0 / np.pi
 
 
 @dataclass(frozen=True)
-class Crossing:
-    """A natural frequency met by an engine order."""
+class OrderCrossing:
+    """Crossing of a natural frequency with an engine order."""
 
     mode: int
     """counted from 0"""
     order: float
     """periods per revolution"""
-    speed: Annotated[float, Unit("rad/s")]
-    """where they meet"""
-    frequency_hz: Annotated[float, Unit("Hz")]
-    """of both"""
+    speed: Annotated[float, NumberUnit("rad/s")]
+    """speed of the crossing"""
+    frequency_hz: Annotated[float, NumberUnit("Hz")]
+    """frequency of the crossing"""
 
     @property
     def rpm(self) -> float:
@@ -49,11 +49,11 @@ class Approach:
     """mode of lower frequency before it"""
     second: int
     """mode of higher frequency before it"""
-    speed: Annotated[float, Unit("rad/s")]
-    """where they approach"""
-    frequency_hz: Annotated[float, Unit("Hz")]
-    """middle of the two"""
-    gap_hz: Annotated[float, Unit("Hz")]
+    speed: Annotated[float, NumberUnit("rad/s")]
+    """speed of the closest approach"""
+    frequency_hz: Annotated[float, NumberUnit("Hz")]
+    """mean of the two frequencies"""
+    gap_hz: Annotated[float, NumberUnit("Hz")]
     """their distance; zero at a crossing"""
     exchange: float
     """MAC of the first one after a veering with the second one before it, the largest over the range: 1 for a full
@@ -86,16 +86,16 @@ class Campbell(Record, Plotted):
     """speeds at which the full structure was solved"""
     orders: Annotated[tuple[float, ...], Array(("engine_order",), name="engine_order", json="orders")]
     """engine orders"""
-    crossings: Annotated[tuple[Crossing, ...], Rows("crossing")]
+    crossings: Annotated[tuple[OrderCrossing, ...], RecordRows("crossing")]
     """with the engine orders, by speed"""
-    approaches: Annotated[tuple[Approach, ...], Rows("approach")]
-    """of two modes: veerings and crossings"""
+    approaches: Annotated[tuple[Approach, ...], RecordRows("approach")]
+    """veerings and crossings of two modes"""
     gyroscopic: bool = False
     """whether the modes have the gyroscopic coupling"""
     operating: tuple[float, float] | None = None
     """lowest and highest speed of operation, to which crossings have a margin; None: not known [rad/s]"""
     warnings: tuple[str, ...] = ()
-    """where modes could not be followed, or are not among those computed"""
+    """where modes could not be followed, or were not computed"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     diameters: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="diameter")] = field(default_factory=empty)
     """of a ring, nodal diameters of the modes, -h of the wave that runs with the turn; else empty"""

@@ -15,15 +15,15 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Named, Record, Rows, Within, empty
+from vanedamp.files.record import Array, Named, Record, RecordRows, Within, empty
 from vanedamp.modal.cyclic import aliased
-from vanedamp.modal.records.campbell import RPM, Crossing
+from vanedamp.modal.records.campbell import RPM, OrderCrossing
 from vanedamp.modal.records.ring_modes import RingModes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Interference(Record, Plotted):
-    """Modes of a ring, and the engine orders that meet them."""
+    """Modes of a ring, and the engine orders that excite them."""
 
     KIND: ClassVar[str] = RingModes.KIND
     IN_JSON = ("modes",)
@@ -32,17 +32,17 @@ class Interference(Record, Plotted):
     orders: Annotated[tuple[int, ...], Array(("engine_order",), dtype=np.int64, name="engine_order")] = ()
     """engine orders that are considered, whole numbers from 1; without any 1 to N"""
     speed: Annotated[float | None, Named("at_speed")] = None
-    """of rotation; None: the ring does not turn [rad/s]"""
+    """speed of rotation; None: the ring does not rotate [rad/s]"""
     operating: Annotated[tuple[float, float] | None, Array(("edge",), "rad/s", attribute=True)] = None
     """lowest and highest speed of operation; None: not known"""
     speeds: Annotated[np.ndarray, Array(("speed",), "rad/s", name="speed")] = field(default_factory=empty)
-    """ascending, of a Campbell diagram; empty: frequencies are taken as those of all speeds"""
+    """speeds of a Campbell diagram, ascending; empty: frequencies do not depend on the speed"""
     over_speed_hz: Annotated[np.ndarray, Array(("mode", "speed"), "Hz", name="frequency_over_speed")] = field(
         default_factory=empty
     )
-    """frequencies there; nan where a mode is not among those computed"""
-    crossings: Annotated[tuple[Crossing, ...], Rows("crossing")] = ()
-    """of the orders and the modes of the diagram"""
+    """frequencies at `speeds`; nan where a mode was not computed"""
+    crossings: Annotated[tuple[OrderCrossing, ...], RecordRows("crossing")] = ()
+    """crossings of orders and modes in the diagram"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -86,7 +86,7 @@ class Interference(Record, Plotted):
         return list(zip(np.unique(self.modes.diameters).tolist(), self.modes.table.tolist(), strict=True))
 
     @cached_property
-    def meetings(self) -> tuple[Crossing, ...]:
+    def meetings(self) -> tuple[OrderCrossing, ...]:
         """Where an order has the frequency of a mode whose diameter it excites, by speed.
 
         Over the speeds of the Campbell diagram, or of operation without one.
@@ -94,21 +94,21 @@ class Interference(Record, Plotted):
         if self.speeds.size or self.operating is None:
             return self.crossings
         low, high = self.operating
-        found = [
-            Crossing(mode, float(order), speed, hz)
+        crossings = [
+            OrderCrossing(mode, float(order), speed, hz)
             for mode, (diameter, hz) in enumerate(
                 zip(self.modes.diameters.tolist(), self.modes.frequencies_hz.tolist(), strict=True)
             )
             for order in self.exciting(diameter)
             if low <= (speed := 2.0 * np.pi * hz / order) <= high and speed > 0.0
         ]
-        return tuple(sorted(found, key=lambda each: (each.speed, each.mode)))
+        return tuple(sorted(crossings, key=lambda crossing: (crossing.speed, crossing.mode)))
 
     @property
-    def in_operation(self) -> tuple[Crossing, ...]:
+    def in_operation(self) -> tuple[OrderCrossing, ...]:
         """The meetings at speeds of operation."""
         operating = self.operating
-        return () if operating is None else tuple(each for each in self.meetings if each.margin(operating) == 0.0)
+        return () if operating is None else tuple(met for met in self.meetings if met.margin(operating) == 0.0)
 
     @property
     def folded_speeds(self) -> list[float]:
@@ -119,8 +119,8 @@ class Interference(Record, Plotted):
         """Return diameters and frequencies (Hz) of the corners of the folded line of a speed, up to `top`."""
         half = 0.5 * self.modes.sectors
         fold = half * speed / (2.0 * np.pi)  # Hz between two corners
-        places = np.append(np.arange(np.ceil(self.top / fold)), self.top / fold)
-        return half * (1.0 - np.abs(places % 2.0 - 1.0)), fold * places
+        folds = np.append(np.arange(np.ceil(self.top / fold)), self.top / fold)
+        return half * (1.0 - np.abs(folds % 2.0 - 1.0)), fold * folds
 
     def derived(self) -> dict[str, Any]:
         """Return speeds, the diameters that orders excite, and where they meet."""
@@ -129,10 +129,10 @@ class Interference(Record, Plotted):
             "speed": self.speed, "operating": operating,
             "excited": {order: self.excited(order) for order in self.orders},
             "meetings": [
-                asdict(each)
-                | {"diameter": int(modes.diameters[each.mode]), "family": int(modes.families[each.mode])}
-                | {"order": int(each.order), "rpm": each.rpm, "margin": operating and each.margin(operating)}
-                for each in self.meetings
+                asdict(met)
+                | {"diameter": int(modes.diameters[met.mode]), "family": int(modes.families[met.mode])}
+                | {"order": int(met.order), "rpm": met.rpm, "margin": operating and met.margin(operating)}
+                for met in self.meetings
             ],
             "campbell": {"rpm": (self.speeds * RPM).tolist(), "frequency_hz": self.over_speed_hz.tolist()},
         }  # fmt: skip

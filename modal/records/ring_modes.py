@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.record import Array, Record
-from vanedamp.modal.algebra import turns
+from vanedamp.modal.algebra import sector_rotations
 from vanedamp.modal.cyclic_faces import CyclicError
 
 
@@ -27,7 +27,7 @@ class RingModes(Record):
     axis: Annotated[np.ndarray, Array(("axis",), attribute=True)]
     """unit vector"""
     point: Annotated[np.ndarray, Array(("axis",), "m", attribute=True)]
-    """of the axis"""
+    """a point of the axis"""
     diameters: Annotated[np.ndarray, Array(("mode",), dtype=np.int64, name="diameter")]
     """h. With gyroscopic coupling h > 0 is the wave against the turn about the axis, -h the one with it, each with its
     own frequency"""
@@ -36,7 +36,7 @@ class RingModes(Record):
     frequencies_hz: Annotated[np.ndarray, Array(("mode",), "Hz", name="frequency", json="frequency_hz")]
     """natural frequencies"""
     residuals: Annotated[np.ndarray, Array(("mode",), name="residual")]
-    """as those of `modes.Modes`"""
+    """as in `modes.Modes`"""
     shapes: Annotated[np.ndarray, Array(("mode", "dof"), "kg^-0.5", dtype=complex, name="shape")]
     """z on sector 0, x, y and z of every node in turn. The modal mass over the ring is 1: N z^H M z = 1 for h = 0 and
     N / 2 (real z), and (N / 2) z^H M z = 1 else. Its largest component is real and positive"""
@@ -46,7 +46,7 @@ class RingModes(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         lengths = {
-            len(one) for one in (self.diameters, self.families, self.frequencies_hz, self.residuals, self.shapes)
+            len(array) for array in (self.diameters, self.families, self.frequencies_hz, self.residuals, self.shapes)
         }
         if len(lengths) != 1 or self.shapes.ndim != 2:
             raise CyclicError(f"modes: shapes {self.shapes.shape} do not fit {len(self.diameters)} diameters")
@@ -62,14 +62,14 @@ class RingModes(Record):
     @property
     def table(self) -> np.ndarray:
         """Frequencies (diameters, families), Hz, of the diameters in ascending order; nan where there is none."""
-        known = np.unique(self.diameters)
-        found = np.full((known.size, int(self.families.max()) + 1), np.nan)
-        found[np.searchsorted(known, self.diameters), self.families] = self.frequencies_hz
-        return found
+        diameters = np.unique(self.diameters)
+        frequencies = np.full((diameters.size, int(self.families.max()) + 1), np.nan)
+        frequencies[np.searchsorted(diameters, self.diameters), self.families] = self.frequencies_hz
+        return frequencies
 
     def whole(self, mode: int, phase: float = 0.0) -> np.ndarray:
         """Return the displacements (N, n_nodes, 3) of all sectors in the global axes, at a phase omega t (rad)."""
         steps = np.arange(self.sectors) * self.angle
         turned = np.exp(1j * (phase + self.diameters[mode] * steps))
-        own = (turned[:, None] * self.shapes[mode]).real.reshape(self.sectors, -1, 3)
-        return np.einsum("sij,snj->sni", turns(self.axis, self.sectors), own)
+        displacements = (turned[:, None] * self.shapes[mode]).real.reshape(self.sectors, -1, 3)
+        return np.einsum("sij,snj->sni", sector_rotations(self.axis, self.sectors), displacements)

@@ -95,7 +95,7 @@ def basis_of(
     """Return the basis of `reduce`, with its arguments and errors, from one factorisation."""
     stiffness, mass, vectors = interface.restrict(matrices)
     boundary, labels = _boundary(interface, vectors)
-    held = _held(matrices, interface, stiffness, mass, boundary, factorize)
+    held = _constrained(matrices, interface, stiffness, mass, boundary, factorize)
     constraint = held.constraint
     if interface.full.size:
         constraint = constraint @ _characteristic(constraint, stiffness, mass, labels, characteristic)
@@ -107,9 +107,9 @@ def reduced_model(
     matrices: SystemMatrices, interface: Interface, parts: Basis, origin: dict[str, Any], keep_recovery: bool = False
 ) -> ReducedModel:
     """Return the model that a basis makes of a structure; origin: entries of its provenance."""
-    basis, kept = parts.fields, parts.fixed.shape[1]
+    basis, modes = parts.fields, parts.fixed.shape[1]
     selection = np.eye(len(interface.labels), basis.shape[1])
-    return project(matrices, interface, basis, selection, parts.blocks, origin, keep_recovery, kept)
+    return project(matrices, interface, basis, selection, parts.blocks, origin, keep_recovery, modes)
 
 
 def _boundary(interface: Interface, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,23 +134,25 @@ def _characteristic(
     Castanier, Tan and Pierre (2001), AIAA J. 39(6): the lowest modes of the constraint modes' own stiffness and mass.
     They are made free of the former, so that only these move the interface coordinates.
     """
-    size, own = len(labels[0]), len(labels)
-    if not 0 <= count <= size - own:
-        raise ReductionError(f"characteristic: expected 0 to {size - own} (the boundary has no more), not {count}")
+    size, constraints = len(labels[0]), len(labels)
+    if not 0 <= count <= size - constraints:
+        raise ReductionError(
+            f"characteristic: expected 0 to {size - constraints} (the boundary has no more), not {count}"
+        )
     condensed, inertia = (symmetric_part(constraint.T @ (matrix @ constraint)) for matrix in (stiffness, mass))
     scale = np.abs(condensed).max()
-    saddle = np.block([[condensed, scale * labels.T], [scale * labels, np.zeros((own, own))]])
-    static = np.linalg.solve(saddle, np.eye(size + own)[:, size:] * scale)[:size]
+    saddle = np.block([[condensed, scale * labels.T], [scale * labels, np.zeros((constraints, constraints))]])
+    static = np.linalg.solve(saddle, np.eye(size + constraints)[:, size:] * scale)[:size]
     if count == 0:
         return static
-    modes = linalg.eigh(condensed, inertia, subset_by_index=[0, min(count + own, size) - 1])[1]
-    # in their order, without those that repeat the static displacements and the modes before
-    kept = np.linalg.qr(linalg.cholesky(inertia) @ np.hstack([static, modes]), mode="r")
-    news = np.flatnonzero(np.abs(np.diag(kept))[own:] > 1e-6)[:count]
-    return np.hstack([static, (modes - static @ (labels @ modes))[:, news]])
+    modes = linalg.eigh(condensed, inertia, subset_by_index=[0, min(count + constraints, size) - 1])[1]
+    # in order, without modes that depend on the static displacements and earlier modes
+    triangle = np.linalg.qr(linalg.cholesky(inertia) @ np.hstack([static, modes]), mode="r")
+    independent = np.flatnonzero(np.abs(np.diag(triangle))[constraints:] > 1e-6)[:count]
+    return np.hstack([static, (modes - static @ (labels @ modes))[:, independent]])
 
 
-def _held(
+def _constrained(
     matrices: SystemMatrices,
     interface: Interface,
     stiffness: sparse.csr_array,
@@ -171,16 +173,16 @@ class _Supported:
     """A structure that its supports hold: from the factors of its own stiffness; constraint: (n, k) constraint modes.
 
     The response with the interface held is the one without, less the constraint modes' part of it. That cancels digits
-    where the supports are much softer than the structure; `error` says how exact it is, relative to 1.
+    where the supports are much softer than the structure; `error` is its relative error.
     """
 
     def __init__(self, stiffness: sparse.csr_array, vectors: np.ndarray, factorize: Factorize) -> None:
         self._factor, self._vectors = factorize(stiffness), vectors
         flexible = self._factor.solve(vectors)
         self.constraint = linalg.solve(symmetric_part(vectors.T @ flexible), flexible.T, assume_a="pos").T
-        known = np.random.default_rng(0).standard_normal(len(vectors))
-        known -= self.constraint @ (vectors.T @ known)
-        self.error = float(np.abs(self.solve(stiffness @ known) - known).max() / np.abs(known).max())
+        probe = np.random.default_rng(0).standard_normal(len(vectors))
+        probe -= self.constraint @ (vectors.T @ probe)
+        self.error = float(np.abs(self.solve(stiffness @ probe) - probe).max() / np.abs(probe).max())
 
     def solve(self, load: np.ndarray) -> np.ndarray:
         """Return displacements (n,) or (n, m) under loads of that shape, interface held."""
@@ -198,13 +200,13 @@ class _Bordered:
         border = sparse.csr_array(vectors * scale)
         bordered = sparse.csr_array(sparse.bmat([[stiffness, border], [border.T, None]]))
         self._factor = factorize(bordered)
-        known = np.random.default_rng(0).standard_normal(bordered.shape[0])
-        if not np.abs(self._factor.solve(bordered @ known) - known).max() < _ROUND_TRIP:
+        probe = np.random.default_rng(0).standard_normal(bordered.shape[0])
+        if not np.abs(self._factor.solve(bordered @ probe) - probe).max() < _ROUND_TRIP:
             raise ReductionError(
                 "the structure can move with its interface held: support it or add interface coordinates"
             )
-        given = np.vstack([np.zeros((self.size, self.count)), np.diag(scale)])
-        self.constraint = self._factor.solve(given)[: self.size]
+        loads = np.vstack([np.zeros((self.size, self.count)), np.diag(scale)])
+        self.constraint = self._factor.solve(loads)[: self.size]
 
     def solve(self, load: np.ndarray) -> np.ndarray:
         """Return the same as _Supported."""
@@ -215,7 +217,7 @@ def _fixed_interface_modes(held: _Supported | _Bordered, mass: sparse.csr_array,
     """Return mass-normalised modes (n, modes), by frequency; count: of the held functionals.
 
     The inverse of the held stiffness maps into W^T q = 0 and is self-adjoint in the inner product of the mass, so that
-    Lanczos on it finds the held modes and never sees the interface; small structures are solved densely.
+    Lanczos on it finds the modes with the interface held; small structures are solved densely.
     """
     size = mass.shape[0]
     if not 0 <= modes <= size - count:
@@ -244,25 +246,25 @@ def _quasi_static_blocks(
     unit = constraint / np.sqrt(np.einsum("ij,ij->j", constraint, mass @ constraint))
 
     def select(block: np.ndarray, before: list[np.ndarray]) -> np.ndarray:
-        known = [fixed]
-        for other in before:
-            known.append(orthonormal(other, mass, known))
-        rest = orthogonal(block, mass, known)
-        shares, turns = np.linalg.eigh(rest.T @ (mass @ rest))
-        block = block @ turns
-        own = block[:, len(shares) - _independent(block, shares, np.hstack([unit, fixed, *before]), mass) :]
-        return own * column_signs(own)
+        blocks = [fixed]
+        for earlier in before:
+            blocks.append(orthonormal(earlier, mass, blocks))
+        residual = orthogonal(block, mass, blocks)
+        shares, vectors = np.linalg.eigh(residual.T @ (mass @ residual))
+        block = block @ vectors
+        independent = block[:, len(shares) - _independent(block, shares, np.hstack([unit, fixed, *before]), mass) :]
+        return independent * column_signs(independent)
 
     return krylov(held.solve(mass @ constraint), held.solve, mass, count, select)
 
 
-def _independent(fields: np.ndarray, shares: np.ndarray, known: np.ndarray, mass: sparse.csr_array) -> int:
+def _independent(fields: np.ndarray, shares: np.ndarray, others: np.ndarray, mass: sparse.csr_array) -> int:
     """Count the last fields (n, m), by rising own fractions, that leave the mass of all together well conditioned.
 
     A small fraction multiplies with the fractions of nearly dependent known fields, so it does not decide by itself.
     """
     for count in range(int(np.count_nonzero(shares > _OWN_SHARE)), 0, -1):
-        together = np.hstack([known, fields[:, -count:]])
+        together = np.hstack([others, fields[:, -count:]])
         if np.linalg.eigvalsh(together.T @ (mass @ together))[0] > _SMALLEST:
             return count
     return 0

@@ -31,11 +31,11 @@ from vanedamp.rom.bases.projection import (
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.reduced import ReducedModel
 
-# of the squared frequency of uniform strains: small compared with modes, far above round-off of the factorisation
+# relative to the squared frequency of uniform strains: far below modes, far above round-off of the factorisation
 _SHIFT = 1e-4
 _ROUNDS = 200
 _CONVERGED = 1e-12
-# fraction of the static response that the modes have left, below which an attachment mode is round-off
+# fraction of the modes' static response below which an attachment mode is round-off
 _LEFT = 1e-9
 
 
@@ -90,7 +90,7 @@ def _attachments(
     inertia = mass @ shapes
 
     def static(load: np.ndarray) -> np.ndarray:
-        """Return K^-1 load without the kept modes, for loads that these do not feel."""
+        """Return K^-1 load without the kept modes, for loads orthogonal to these."""
         response = np.zeros_like(load)
         for _ in range(_ROUNDS if shift else 1):
             before = response
@@ -100,9 +100,9 @@ def _attachments(
                 break
         return response
 
-    known = shapes.T @ vectors
-    block = static(vectors - inertia @ known)
+    components = shapes.T @ vectors
+    block = static(vectors - inertia @ components)
     elastic = squares > 0.0
-    known_part = np.linalg.norm(known[elastic] / squares[elastic, None], axis=0)
-    left = np.sqrt(np.einsum("ij,ij->j", block, mass @ block)) > _LEFT * known_part
-    return [found * column_signs(found) for found in krylov(block[:, left], static, mass, count)]
+    retained = np.linalg.norm(components[elastic] / squares[elastic, None], axis=0)
+    independent = np.sqrt(np.einsum("ij,ij->j", block, mass @ block)) > _LEFT * retained
+    return [attachment * column_signs(attachment) for attachment in krylov(block[:, independent], static, mass, count)]

@@ -18,12 +18,12 @@ from vanedamp.modal.matrices import SystemMatrices
 from vanedamp.rom.interface import Interface, rigid_basis
 from vanedamp.rom.reduced import ReducedModel
 
-# of the squared frequency of uniform strains: a motion below it does not strain
+# relative to the squared frequency of uniform strains: motions below it are rigid
 _RIGID = 1e-9
 
 
 class ReductionError(VanedampError):
-    """A structure that cannot be reduced as asked; the message says what to change."""
+    """A structure that cannot be reduced as asked; the message names the remedy."""
 
 
 class Solver(Protocol):
@@ -103,7 +103,7 @@ def project(
         symmetric_part(recovery.T @ (matrix @ recovery)) for matrix in (matrices.mass, matrices.stiffness)
     )
     free_modes = 0 if squares is None else len(squares)
-    if squares is not None:  # what couples them with the rest, and with each other, is round-off
+    if squares is not None:  # their coupling with the rest, and with each other, is round-off
         lead = slice(basis.shape[1] - free_modes)
         mass = linalg.block_diag(mass[lead, lead], np.eye(free_modes))
         stiffness = linalg.block_diag(stiffness[lead, lead], np.diag(squares))

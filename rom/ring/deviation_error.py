@@ -1,8 +1,9 @@
 """Error that a reduced ring makes of the frequencies of a ring of which one sector deviates, by its residual.
 
-A mode x of the reduced ring with the squared frequency q is one of the full one but for the force r = K x - q M x,
-which no motion of the reduced ring feels. Its frequency is too high by about r^T K^-1 r / (2 q), K^-1 at most that of
-the tuned ring over 1 + d where a part is softer by d. In waves around the ring, this takes one sector per diameter.
+A mode x of the reduced ring with the squared frequency q is a mode of the full ring, except for the force
+r = K x - q M x, which is orthogonal to all motions of the reduced ring. Its frequency is too high by about
+r^T K^-1 r / (2 q), where K^-1 is at most the tuned ring's over 1 + d if a part is softer by d. In waves around the
+ring, this takes one sector per diameter.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from scipy import linalg
 from vanedamp.modal.cyclic import CyclicSector
 from vanedamp.rom.bases.projection import Factorize
 from vanedamp.rom.ring.deviations import Deviations
-from vanedamp.rom.ring.diameters import Part, Statics
+from vanedamp.rom.ring.diameters import DeviatingPart, DiameterStatics
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 
@@ -22,21 +23,21 @@ SIZES = (-0.3, -0.5, -0.9, 1.0)
 
 
 def deviation_errors(
-    ring: RingModel | SectorRing, sector: CyclicSector, fields: np.ndarray, part: Part, factorize: Factorize
+    ring: RingModel | SectorRing, sector: CyclicSector, fields: np.ndarray, part: DeviatingPart, factorize: Factorize
 ) -> list[float]:
     """Return the largest relative error of the natural frequencies that a ring keeps, for every deviation of SIZES.
 
-    fields (c, n): those of a sector that the ring's coordinates there multiply.
+    fields (c, n): of a sector, multiplied by the ring's coordinates there.
     """
     modes = [_modes(ring, size) for size in SIZES]
     errors = [np.zeros(len(squares)) for squares, _ in modes]
     around = np.fft.fft(np.eye(sector.sectors))  # the waves are its columns
     for number in sector.diameters:
-        statics = Statics(sector, number, factorize)
+        statics = DiameterStatics(sector, number, factorize)
         for size, error, (squares, coordinates) in zip(SIZES, errors, modes, strict=True):
             waves = np.einsum("j,jcm->mc", around[:, number], coordinates) @ fields
-            own = (size * (part.stiffness @ (fields.T @ coordinates[0]))).T
-            error += statics.residual_energies(statics.own(waves), squares, own) / squares
+            forces = (size * (part.stiffness @ (fields.T @ coordinates[0]))).T
+            error += statics.residual_energies(statics.of_diameter(waves), squares, forces) / squares
     return [float(0.5 * error.max() / (1.0 + min(size, 0.0))) for size, error in zip(SIZES, errors, strict=True)]
 
 

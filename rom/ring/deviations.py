@@ -31,10 +31,10 @@ class Deviations:
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass", "damping"):
-            given = getattr(self, name)
-            if given is None:
+            deviation = getattr(self, name)
+            if deviation is None:
                 continue
-            values = store.frozen(given)
+            values = store.frozen(deviation)
             if values.ndim != 1 or not np.all(np.isfinite(values)):
                 raise RingError(f"{name}: expected a finite deviation for each sector")
             worst = int(np.argmin(values))

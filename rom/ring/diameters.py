@@ -25,15 +25,15 @@ from vanedamp.rom.ring.deviations import RingError
 
 # relative change of a squared frequency, per squared deviation, that static responses to deviations may leave out
 _LEFT_OUT = 1e-5
-# of the strain energy of a static response to the interface: below it the others determine it
+# fraction of the strain energy of a static response to the interface: below it, the response depends on others
 _DEPENDENT = 1e-9
 # points of the receptance, and where they end: over the first family, if the last one reaches so far
 _POINTS, _REACH = 17, 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """What of a sector deviates: stiffness and mass (n, n), sparse, such as those of the blade."""
+class DeviatingPart:
+    """Deviating part of a sector: stiffness and mass (n, n), sparse, such as of the blade."""
 
     stiffness: sparse.csr_array
     mass: sparse.csr_array
@@ -65,7 +65,7 @@ class Bases(NamedTuple):
 
 
 def ring_waves(
-    sector: CyclicSector, vectors: np.ndarray, families: int, max_frequency: float | None, part: Part,
+    sector: CyclicSector, vectors: np.ndarray, families: int, max_frequency: float | None, part: DeviatingPart,
     by_speed: Sequence[sparse.csr_array], greatest_speed: float, factorize: Factorize,
     report: Callable[[int, int], None] | None,
 ) -> Bases:  # fmt: skip
@@ -77,65 +77,66 @@ def ring_waves(
     if by_speed:
         stiffness = sector.matrices.stiffness + added_by_speed(greatest_speed, greatest_speed, by_speed)
         sectors.append(replace(sector, matrices=replace(sector.matrices, stiffness=stiffness)))
-    found = [ring_modes(one, families, max_frequency) for one in sectors]
-    if found[0].frequencies_hz.min() == 0.0:
+    modes_at = [ring_modes(sector_at, families, max_frequency) for sector_at in sectors]
+    if modes_at[0].frequencies_hz.min() == 0.0:
         raise RingError("support: the ring can move freely; hold it, since its static responses are part of the model")
-    forces = np.vstack([_forces(modes, part) for modes in found])
-    waves, errors, total, top = [], [], len(sector.diameters), _top(found[0])
+    forces = np.vstack([_forces(modes, part) for modes in modes_at])
+    waves, errors, total, top = [], [], len(sector.diameters), _top(modes_at[0])
     for done, number in enumerate(sector.diameters):
         if report is not None:
             report(done, total)
-        one, error = _of_diameter(sectors, found, number, vectors, forces, factorize, top)
-        waves.append(one)
+        wave, error = _of_diameter(sectors, modes_at, number, vectors, forces, factorize, top)
+        waves.append(wave)
         errors.append(error)
-    receptance, left = (max(values) for values in zip(*errors, strict=True))
-    count = sum(one.modes * (1 + one.problem.travels) for one in waves)
+    receptance, remainder = (max(values) for values in zip(*errors, strict=True))
+    count = sum(wave.modes * (1 + wave.problem.travels) for wave in waves)
     return Bases(waves, {
-        "receptance": receptance, "deviation": left, "frequencies_hz": [0.0, top / (2.0 * np.pi)],
+        "receptance": receptance, "deviation": remainder, "frequencies_hz": [0.0, top / (2.0 * np.pi)],
         "sentence": f"{count} natural modes of the ring: estimated error {100 * receptance:.2g} % of the "
         "interface's receptance",
     })  # fmt: skip
 
 
-def _forces(modes: RingModes, part: Part) -> np.ndarray:
-    """Return real forces (f, n) that span those of deviations in a sector, on modes of unit strain energy.
+def _forces(modes: RingModes, part: DeviatingPart) -> np.ndarray:
+    """Return real forces (f, n) that span the forces of deviations in a sector, on modes of unit strain energy.
 
     The strain energy of the static response to K_p z is at most z K_p z, to M_p z at most z M_p z over the lowest
-    squared frequency: what has less of it is left out.
+    squared frequency: forces with less energy are left out.
     """
     omegas, fields = 2.0 * np.pi * modes.frequencies_hz, np.vstack([modes.shapes.real, modes.shapes.imag])
     lowest, spans = omegas.min(), []
     for matrix, scales, factor in ((part.stiffness, 1.0 / omegas, 1.0), (part.mass, omegas / lowest, lowest)):
         scaled = np.tile(scales, 2)[:, None] * fields
         loads = np.asarray((matrix @ scaled.T).T)
-        energies, turns = linalg.eigh(loads @ scaled.T)
-        spans.append(factor * turns[:, modes.sectors * energies > _LEFT_OUT].T @ loads)
+        energies, vectors = linalg.eigh(loads @ scaled.T)
+        spans.append(factor * vectors[:, modes.sectors * energies > _LEFT_OUT].T @ loads)
     return np.vstack(spans)
 
 
 def _of_diameter(
-    sectors: Sequence[CyclicSector], found: Sequence[RingModes], number: int, vectors: np.ndarray, forces: np.ndarray,
-    factorize: Factorize, top: float,
+    sectors: Sequence[CyclicSector], modes_at: Sequence[RingModes], number: int, vectors: np.ndarray,
+    forces: np.ndarray, factorize: Factorize, top: float,
 ) -> tuple[DiameterWaves, tuple[float, float]]:  # fmt: skip
     """Return the waves of a diameter, and the errors of the receptance and of deviations that they leave.
 
-    sectors, found: at standstill, and at the greatest speed, and their modes; vectors (k, n) of the interface.
+    sectors, modes_at: at standstill, and at the greatest speed, and their modes; vectors (k, n) of the interface.
     """
-    statics = [Statics(sector, number, factorize) for sector in sectors]
+    statics = [DiameterStatics(sector, number, factorize) for sector in sectors]
     first = statics[0]
-    lead = first.own(_shapes(found[0], number))
-    lead_squares = _squares(found[0], number)
+    lead = first.of_diameter(_shapes(modes_at[0], number))
+    lead_squares = _squares(modes_at[0], number)
     wanted = [first.response(vectors)]
-    for static, modes in zip(statics[1:], found[1:], strict=True):
-        wanted += [static.response(vectors), static.own(_shapes(modes, number))]
-    rest, _ = first.independent(np.vstack(wanted), lead, _DEPENDENT, unit=True)
-    others, left = first.independent(np.vstack([static.response(forces) for static in statics]),
-                                     np.vstack([lead, rest]), _LEFT_OUT)  # fmt: skip
-    squares, fields = first.ritz(np.vstack([rest, others]))
+    for static, modes in zip(statics[1:], modes_at[1:], strict=True):
+        wanted += [static.response(vectors), static.of_diameter(_shapes(modes, number))]
+    attachments, _ = first.independent(np.vstack(wanted), lead, _DEPENDENT, unit=True)
+    responses, remainder = first.independent(
+        np.vstack([static.response(forces) for static in statics]), np.vstack([lead, attachments]), _LEFT_OUT
+    )
+    squares, fields = first.ritz(np.vstack([attachments, responses]))
     waves = DiameterWaves(
         first.problem, np.vstack([lead, fields]), np.r_[lead_squares, squares], len(lead), first.factor
     )
-    return waves, (first.receptance_error(waves, vectors, top), left)
+    return waves, (first.receptance_error(waves, vectors, top), remainder)
 
 
 def _top(modes: RingModes) -> float:
@@ -152,7 +153,7 @@ def _squares(modes: RingModes, number: int) -> np.ndarray:
     return np.asarray((2.0 * np.pi * modes.frequencies_hz[modes.diameters == number]) ** 2)
 
 
-class Statics:
+class DiameterStatics:
     """Static responses in a nodal diameter, and products of complex fields (p, n) over the ring."""
 
     def __init__(self, sector: CyclicSector, number: int, factorize: Factorize) -> None:
@@ -168,19 +169,19 @@ class Statics:
         """Return the fields (p, n) under loads (p, n), real or complex, on a sector."""
         rows = np.zeros((len(loads), self.problem.matrices.size))
         rows[:, self._free] = self._factors.solve(self.problem.forces(loads.T)[self._free]).T
-        return self.own(self.problem.fields(rows))
+        return self.of_diameter(self.problem.fields(rows))
 
-    def own(self, values: np.ndarray) -> np.ndarray:
+    def of_diameter(self, values: np.ndarray) -> np.ndarray:
         """Return fields, or products of them, as the diameter has them: real where it does not travel."""
         return values if self.problem.travels else np.asarray(values.real)
 
     def energies(self, fields: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Return fields^H K others over the ring."""
-        return self.own(self.factor * fields.conj() @ (self._stiffness @ others.T))
+        return self.of_diameter(self.factor * fields.conj() @ (self._stiffness @ others.T))
 
     def masses(self, fields: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Return fields^H M others over the ring."""
-        return self.own(self.factor * fields.conj() @ (self._mass @ others.T))
+        return self.of_diameter(self.factor * fields.conj() @ (self._mass @ others.T))
 
     def residual_energies(self, waves: np.ndarray, squares: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Return r^H K^-1 r over the ring (p,), of r = K z - q M z + f of waves z (p, n), squares q and forces f.
@@ -188,11 +189,11 @@ class Statics:
         The waves are sums over sectors, so that the forces may act on one of them.
         """
         residual = (self._stiffness @ waves.T - squares * (self._mass @ waves.T)).T + forces
-        found = self.response(self.own(residual))
-        return np.asarray(np.einsum("pn,pn->p", residual.conj(), found).real / self.factor)
+        displacements = self.response(self.of_diameter(residual))
+        return np.asarray(np.einsum("pn,pn->p", residual.conj(), displacements).real / self.factor)
 
     def independent(
-        self, fields: np.ndarray, known: np.ndarray, least: float, unit: bool = False
+        self, fields: np.ndarray, basis: np.ndarray, least: float, unit: bool = False
     ) -> tuple[np.ndarray, float]:
         """Return combinations (q, n) without the known ones, of more strain energy than the least, of unit energy.
 
@@ -202,20 +203,20 @@ class Statics:
             return fields, 0.0
         if unit:
             fields = fields / np.sqrt(np.einsum("ii->i", self.energies(fields, fields)).real)[:, None]
-        inner = self.energies(known, known)
+        inner = self.energies(basis, basis)
         for _ in range(2):
-            fields = fields - np.linalg.solve(inner, self.energies(known, fields)).T @ known
-        energies, turns = linalg.eigh(self.energies(fields, fields))
-        own = energies > least
-        left = max(float(energies[~own].max(initial=0.0)), 0.0)
-        return (turns[:, own] / np.sqrt(energies[own])).T @ fields, left
+            fields = fields - np.linalg.solve(inner, self.energies(basis, fields)).T @ basis
+        energies, vectors = linalg.eigh(self.energies(fields, fields))
+        independent = energies > least
+        remainder = max(float(energies[~independent].max(initial=0.0)), 0.0)
+        return (vectors[:, independent] / np.sqrt(energies[independent])).T @ fields, remainder
 
     def ritz(self, fields: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return squared frequencies (q,) and fields (q, n) of modal mass 1 in the span of fields."""
         if not len(fields):
             return np.empty(0), fields
-        inverse, turns = linalg.eigh(self.masses(fields, fields), self.energies(fields, fields))
-        return 1.0 / inverse, (turns / np.sqrt(inverse)).T @ fields
+        inverse, vectors = linalg.eigh(self.masses(fields, fields), self.energies(fields, fields))
+        return 1.0 / inverse, (vectors / np.sqrt(inverse)).T @ fields
 
     def receptance_error(self, waves: DiameterWaves, vectors: np.ndarray, top: float) -> float:
         """Return the largest error of the interface's receptance by modes and static response, relative.
@@ -225,13 +226,13 @@ class Statics:
         attached = waves.fields[waves.modes :]
         further, _ = self.independent(self.response((self._mass @ attached.T).T), waves.fields, _DEPENDENT, unit=True)
         squares, fields = self.ritz(np.vstack([attached, further]))
-        kept, rest = (vectors @ block.T for block in (waves.fields[: waves.modes], fields))
+        modes, residuals = (vectors @ block.T for block in (waves.fields[: waves.modes], fields))
         lowest = waves.squares[: waves.modes]
-        static = (rest / squares) @ rest.conj().T
+        static = (residuals / squares) @ residuals.conj().T
         ratio = self.problem.matrices.damping_ratio
         worst = 0.0
         for omega in np.linspace(0.0, top, _POINTS):
-            modal = (kept / (lowest - omega**2 + 2j * ratio * omega * np.sqrt(lowest))) @ kept.conj().T
-            dynamic = (rest / (squares - omega**2 + 2j * ratio * omega * np.sqrt(squares))) @ rest.conj().T
+            modal = (modes / (lowest - omega**2 + 2j * ratio * omega * np.sqrt(lowest))) @ modes.conj().T
+            dynamic = (residuals / (squares - omega**2 + 2j * ratio * omega * np.sqrt(squares))) @ residuals.conj().T
             worst = max(worst, float(np.linalg.norm(static - dynamic) / np.linalg.norm(modal + dynamic)))
         return worst

@@ -1,8 +1,8 @@
 """Families of a ring's natural modes: of the tuned ring by nodal diameter, of a mistuned one by their kinetic energy.
 
-Families may overlap in frequency: the second one of few diameters may lie below the first one of many. The number of a
-mode among those of its own diameter still names its family; a mode of a ring with deviations belongs to the family in
-which most of its kinetic energy is.
+Families may overlap in frequency: the second family at few diameters may lie below the first at many. The number of a
+mode within its diameter still names its family; a mode of a ring with deviations belongs to the family with most of
+its kinetic energy.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ class Families:
 
     def frequency_hz(self, diameter: int, number: int) -> float:
         """Return the frequency of a family at a nodal diameter; nan if it has none there."""
-        own = self.squares[(self.diameters == diameter) & (self.numbers == number)]
-        return float(np.sqrt(own[0]) / (2.0 * np.pi)) if len(own) else np.nan
+        squares = self.squares[(self.diameters == diameter) & (self.numbers == number)]
+        return float(np.sqrt(squares[0]) / (2.0 * np.pi)) if len(squares) else np.nan
 
     def of_modes(self, shapes: np.ndarray) -> np.ndarray:
         """Return the families (k,) of shapes (n, k) of modal mass 1; -1: of none of them."""
         energies = (self.momenta @ shapes) ** 2
         count = int(self.numbers.max()) + 1
-        parts = np.array([energies[self.numbers == number].sum(axis=0) for number in range(count)])
-        return np.where(parts.sum(axis=0) > 0.5, np.argmax(parts, axis=0), -1)
+        contributions = np.array([energies[self.numbers == number].sum(axis=0) for number in range(count)])
+        return np.where(contributions.sum(axis=0) > 0.5, np.argmax(contributions, axis=0), -1)

@@ -30,7 +30,7 @@ _NEAR = 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class Forced:
+class OrderResponse:
     """Response of N sectors over the frequency.
 
     poles (p,) rad/s; residues (p, N); residual (N,) m: per force F of 1 N; modes (p,): the natural mode of each pole.
@@ -47,7 +47,7 @@ class Forced:
 
     def at(self, frequencies_hz: np.ndarray) -> np.ndarray:
         """Return complex amplitudes (f, N), m/N."""
-        return self._parts(frequencies_hz, slice(None)) + self.residual
+        return self._contributions(frequencies_hz, slice(None)) + self.residual
 
     def peaks(self, low_hz: float, high_hz: float, modes: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return the largest peak (N,), m/N, of every sector between two frequencies, and where (N,), Hz.
@@ -61,32 +61,32 @@ class Forced:
         grid = np.unique(np.r_[low_hz, high_hz, near[(near > low_hz) & (near < high_hz)]])
         response = self.at(grid)
         sizes = np.abs(response)
-        tops = np.zeros(sizes.shape, bool)
-        tops[1:-1] = (sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:])
+        is_peak = np.zeros(sizes.shape, bool)
+        is_peak[1:-1] = (sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:])
         if modes is not None:
-            own = self._parts(grid, np.isin(self.modes, modes))
-            tops &= np.abs(own) > np.abs(response - own)
+            contribution = self._contributions(grid, np.isin(self.modes, modes))
+            is_peak &= np.abs(contribution) > np.abs(response - contribution)
         # the largest sample may be of a lower peak, but not by much
-        tops &= sizes > _NEAR * np.where(tops, sizes, 0.0).max(axis=0)
-        place, sector = np.nonzero(tops)
-        low, high, every = grid[place - 1], grid[place + 1], np.arange(len(place))
+        is_peak &= sizes > _NEAR * np.where(is_peak, sizes, 0.0).max(axis=0)
+        index, sector = np.nonzero(is_peak)
+        low, high, every = grid[index - 1], grid[index + 1], np.arange(len(index))
         for _ in range(_ROUNDS):  # the amplitude rises and falls once between neighbours of a local maximum
             points = np.linspace(low, high, 5)
-            best = np.clip(np.argmax(self._own(points, sector), axis=0), 1, 3)
+            best = np.clip(np.argmax(self._amplitudes(points, sector), axis=0), 1, 3)
             low, high = points[best - 1, every], points[best + 1, every]
         middle = 0.5 * (low + high)
         largest, where = np.full(sizes.shape[1], np.nan), np.full(sizes.shape[1], np.nan)
-        values = self._own(middle[None], sector)[0]
-        for one in np.argsort(values, kind="stable"):
-            largest[sector[one]], where[sector[one]] = values[one], middle[one]
+        values = self._amplitudes(middle[None], sector)[0]
+        for peak in np.argsort(values, kind="stable"):
+            largest[sector[peak]], where[sector[peak]] = values[peak], middle[peak]
         return largest, where
 
-    def _parts(self, frequencies_hz: np.ndarray, poles: slice | np.ndarray) -> np.ndarray:
-        """Return what some poles contribute to the complex amplitudes (f, N)."""
+    def _contributions(self, frequencies_hz: np.ndarray, poles: slice | np.ndarray) -> np.ndarray:
+        """Return the contribution of some poles to the complex amplitudes (f, N)."""
         s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)
         return np.asarray((1.0 / (s[:, None] - self.poles[poles])) @ self.residues[poles])
 
-    def _own(self, points: np.ndarray, sector: np.ndarray) -> np.ndarray:
+    def _amplitudes(self, points: np.ndarray, sector: np.ndarray) -> np.ndarray:
         """Return amplitudes (q, c) at frequencies (q, c), each column of a sector (c,)."""
         terms = self.residues[:, sector] / (2j * np.pi * points[:, None, :] - self.poles[:, None])
         return np.abs(terms.sum(axis=1) + self.residual[sector])
@@ -112,7 +112,7 @@ def forced_response(
 def forced(
     model: RingModel | SectorRing | ReducedModel, order: int, label: str, at: str | None = None,
     deviations: Deviations | None = None, speed: float = 0.0,
-) -> Forced:  # fmt: skip
+) -> OrderResponse:  # fmt: skip
     """Return the response to an engine order over all frequencies. Arguments and errors: see `forced_response`.
 
     speed: of a reduced ring that rotates, rad/s.
@@ -123,15 +123,17 @@ def forced(
     if ring is None:
         raise RingError("model: no reduced ring; a force that turns around needs the sectors of one")
     sectors = int(ring["sectors"])
-    places = [[place_of(model.interface, sector_label(one, j)) for j in range(sectors)] for one in (label, at or label)]
+    coordinates = [
+        [place_of(model.interface, sector_label(name, j)) for j in range(sectors)] for name in (label, at or label)
+    ]
     phases = _phases(order, sectors)
     squares, shapes = model.natural
     rows = model.selection @ shapes
     residual = np.zeros(sectors, complex)
     if model.residual_flexibility is not None:
-        residual = model.residual_flexibility[np.ix_(places[1], places[0])] @ phases
+        residual = model.residual_flexibility[np.ix_(coordinates[1], coordinates[0])] @ phases
     damping = shapes.T @ model.damping @ shapes
-    return _superposed(squares, damping, rows[places[1]], rows[places[0]].T @ phases, residual)
+    return _superposed(squares, damping, rows[coordinates[1]], rows[coordinates[0]].T @ phases, residual)
 
 
 class Natural(NamedTuple):
@@ -142,7 +144,7 @@ class Natural(NamedTuple):
     shapes: np.ndarray
     damping: np.ndarray
 
-    def forced(self, order: int, label: str, at: str | None = None) -> Forced:
+    def forced(self, order: int, label: str, at: str | None = None) -> OrderResponse:
         """Return the response to an engine order. Raises RingError for an unknown label."""
         ring = self.ring
         load = self.shapes.T @ load_of(ring, order, label)
@@ -161,7 +163,7 @@ class OfModel(NamedTuple):
         """(n,) squared angular frequencies."""
         return self.model.squares
 
-    def forced(self, order: int, label: str, at: str | None = None) -> Forced:
+    def forced(self, order: int, label: str, at: str | None = None) -> OrderResponse:
         """Return the response to an engine order. Raises RingError for an unknown label."""
         return forced(self.model, order, label, at)
 
@@ -175,7 +177,7 @@ def natural_of(
     """
     deviations = deviations or Deviations()
     if isinstance(ring, SectorRing):
-        # a family above those of the model, too, which responds to the same forces
+        # also a family above the model's families, which responds to the same forces
         return OfModel(*ring.natural(deviations, speed, min(ring.modes + ring.sectors, ring.size)))
     mass, stiffness = ring.matrices(deviations, speed)
     squares, shapes = linalg.eigh(stiffness, mass)
@@ -189,7 +191,7 @@ def natural_of(
 
 def _superposed(
     squares: np.ndarray, damping: np.ndarray, rows: np.ndarray, load: np.ndarray, residual: np.ndarray
-) -> Forced:
+) -> OrderResponse:
     """Return the response rows @ q of modes (m,) with modal damping (m, m) to modal loads (m,)."""
     count = len(squares)
     diagonal = np.diag(damping)
@@ -197,12 +199,12 @@ def _superposed(
         root = np.sqrt(0.25 * diagonal**2 - squares + 0j)
         poles = np.concatenate([-0.5 * diagonal + root, -0.5 * diagonal - root])
         shares = np.concatenate([load / (2.0 * root), -load / (2.0 * root)])
-        return Forced(poles, np.tile(rows.T, (2, 1)) * shares[:, None], residual, np.tile(np.arange(count), 2))
+        return OrderResponse(poles, np.tile(rows.T, (2, 1)) * shares[:, None], residual, np.tile(np.arange(count), 2))
     first = np.block([[np.zeros((count, count)), np.eye(count)], [-np.diag(squares), -damping]])
     poles, vectors = linalg.eig(first)
     shares = np.linalg.solve(vectors, np.concatenate([np.zeros(count), load]))
     modes = np.argmax(np.abs(vectors[:count]), axis=0)
-    return Forced(poles, (rows @ vectors[:count]).T * shares[:, None], residual, modes)
+    return OrderResponse(poles, (rows @ vectors[:count]).T * shares[:, None], residual, modes)
 
 
 def load_of(ring: RingModel, order: int, label: str) -> np.ndarray:

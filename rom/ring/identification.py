@@ -6,7 +6,7 @@ In the waves of the tuned ring, deviations d_j of the stiffness act on a motion 
 
 linear in the deviations, with load and damping left out for natural modes: the fundamental mistuning model (Feiner and
 Griffin 2004, J. Turbomach. 126(1)) with the sectors' own stiffness. The displacement of one coordinate in every
-sector gives the N waves of one family; the other waves follow from deviations found before, in a few rounds.
+sector gives the N waves of one family; the other waves follow from the deviations, in a few iterations.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from vanedamp.rom.ring.ring_model import RingModel
 
 _ROUNDS = 30
 _CONVERGED = 1e-10
-# of the largest singular value: a sector that no measured motion strains leaves the equations without its deviation
+# relative to the largest singular value: the deviation of a sector that is never strained cannot be identified
 _UNSEEN = 1e-8
 
 
@@ -88,81 +88,81 @@ def _identified(
 ) -> Identified:
     if motions.shape != (len(frequencies_hz), ring.sectors):
         raise RingError(f"shapes: expected {(len(frequencies_hz), ring.sectors)} values, not {motions.shape}")
-    own, rows = _family(ring, family), ring.rows[:, place_of(ring.interface, label)]
-    others = np.setdiff1d(np.arange(len(ring.squares)), own)
+    members, rows = _family(ring, family), ring.rows[:, place_of(ring.interface, label)]
+    others = np.setdiff1d(np.arange(len(ring.squares)), members)
     squares = (2.0 * np.pi * frequencies_hz) ** 2
-    found, rest = np.zeros(ring.sectors), np.zeros((len(squares), len(others)), complex)
+    deviations, other_waves = np.zeros(ring.sectors), np.zeros((len(squares), len(others)), complex)
     for _ in range(_ROUNDS):
         betas = np.zeros((len(squares), len(ring.squares)), complex)
-        betas[:, own] = np.linalg.solve(rows[:, own], (motions - rest @ rows[:, others].T).T).T
-        betas[:, others] = rest
-        equations, right = _equations(ring, squares, betas, own, label, order)
+        betas[:, members] = np.linalg.solve(rows[:, members], (motions - other_waves @ rows[:, others].T).T).T
+        betas[:, others] = other_waves
+        equations, right = _equations(ring, squares, betas, members, label, order)
         solution, errors, misfit = _least_squares(equations, right, ring.sectors)
-        before, found = found, solution[: ring.sectors]
+        before, deviations = deviations, solution[: ring.sectors]
         force = complex(*solution[ring.sectors :]) if order is not None else 0j
         load = force * load_of(ring, order or 0, label)[others]
-        rest = _others(ring, found, squares, betas[:, own], own, others, load)
-        if np.abs(found - before).max() <= _CONVERGED:
+        other_waves = _others(ring, deviations, squares, betas[:, members], members, others, load)
+        if np.abs(deviations - before).max() <= _CONVERGED:
             break
-    return Identified(found, errors, misfit, force)
+    return Identified(deviations, errors, misfit, force)
 
 
 def _family(ring: RingModel, family: int) -> np.ndarray:
-    """Return the places (N,) of a family's waves among the coordinates of a ring."""
+    """Return the indices (N,) of a family's waves among the coordinates of a ring."""
     diameters = ring.diameters[: ring.modes]
     pairs = [1 + (0 < 2 * number < ring.sectors) for number in range(ring.sectors // 2 + 1)]
-    found = [np.flatnonzero(diameters == number)[family * size :][:size] for number, size in enumerate(pairs)]
-    if any(len(places) < size for places, size in zip(found, pairs, strict=True)):
+    members = [np.flatnonzero(diameters == number)[family * size :][:size] for number, size in enumerate(pairs)]
+    if any(len(waves) < size for waves, size in zip(members, pairs, strict=True)):
         raise RingError(f"family: the ring has no family {family} of all nodal diameters; keep more, or name another")
-    return np.concatenate(found)
+    return np.concatenate(members)
 
 
 def _equations(
-    ring: RingModel, squares: np.ndarray, betas: np.ndarray, own: np.ndarray, label: str, order: int | None
+    ring: RingModel, squares: np.ndarray, betas: np.ndarray, members: np.ndarray, label: str, order: int | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return matrix and right-hand side of the real equations of the family's waves, relative to omega^2 beta."""
-    scale = 1.0 / (squares * np.linalg.norm(betas[:, own], axis=1))
-    waves, forces = ring.waves, np.empty((len(squares), len(own), ring.sectors), complex)
+    scale = 1.0 / (squares * np.linalg.norm(betas[:, members], axis=1))
+    waves, forces = ring.waves, np.empty((len(squares), len(members), ring.sectors), complex)
     for sector in range(ring.sectors):  # K_j beta: to the sector's fields and back
         strained = waves.at_sector(betas, -sector) @ ring.stiffness
-        forces[:, :, sector] = waves.at_sector(strained, sector)[:, own]
-    tuned = ring.squares[own] - squares[:, None]
+        forces[:, :, sector] = waves.at_sector(strained, sector)[:, members]
+    tuned = ring.squares[members] - squares[:, None]
     columns = [forces]
     if order is not None:
-        tuned = tuned + 2j * ring.damping_ratio * np.sqrt(squares[:, None] * ring.squares[own])
-        load = load_of(ring, order, label)[own]
-        columns.append(-np.broadcast_to(np.stack([load, 1j * load], axis=-1), (len(squares), len(own), 2)))
-    left = scale[:, None, None] * np.concatenate(columns, axis=2)
-    right = -scale[:, None] * tuned * betas[:, own]
-    left, right = left.reshape(-1, left.shape[2]), right.ravel()
-    return np.vstack([left.real, left.imag]), np.concatenate([right.real, right.imag])
+        tuned = tuned + 2j * ring.damping_ratio * np.sqrt(squares[:, None] * ring.squares[members])
+        load = load_of(ring, order, label)[members]
+        columns.append(-np.broadcast_to(np.stack([load, 1j * load], axis=-1), (len(squares), len(members), 2)))
+    matrix = scale[:, None, None] * np.concatenate(columns, axis=2)
+    right = -scale[:, None] * tuned * betas[:, members]
+    matrix, right = matrix.reshape(-1, matrix.shape[2]), right.ravel()
+    return np.vstack([matrix.real, matrix.imag]), np.concatenate([right.real, right.imag])
 
 
-def _least_squares(left: np.ndarray, right: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray, float]:
+def _least_squares(matrix: np.ndarray, right: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the solution, standard deviations (N,) of the deviations, and the misfit."""
-    size = np.linalg.norm(left, axis=0)
+    size = np.linalg.norm(matrix, axis=0)
     if not np.all(size > 0.0):
         raise RingError(f"shapes: sector {int(np.argmin(size))} is at rest in all of them; measure more modes")
-    u, values, v = np.linalg.svd(left / size, full_matrices=False)
+    u, values, v = np.linalg.svd(matrix / size, full_matrices=False)
     if values[-1] <= _UNSEEN * values[0]:
         raise RingError("shapes: they do not determine all deviations; measure more modes or frequencies")
     solution = v.T @ ((u.T @ right) / values) / size
-    rest = left @ solution - right
-    active = int(np.count_nonzero(np.abs(left).max(axis=1) > 0.0))
-    spread = np.linalg.norm(v.T / values, axis=1) / size * np.linalg.norm(rest)
-    freedom = active - left.shape[1]
+    residual = matrix @ solution - right
+    active = int(np.count_nonzero(np.abs(matrix).max(axis=1) > 0.0))
+    spread = np.linalg.norm(v.T / values, axis=1) / size * np.linalg.norm(residual)
+    freedom = active - matrix.shape[1]
     errors = spread / np.sqrt(freedom) if freedom > 0 else np.full(len(spread), np.nan)
-    return solution, errors[:sectors], float(np.linalg.norm(rest) / np.sqrt(max(active, 1)))
+    return solution, errors[:sectors], float(np.linalg.norm(residual) / np.sqrt(max(active, 1)))
 
 
 def _others(
-    ring: RingModel, found: np.ndarray, squares: np.ndarray, betas: np.ndarray, own: np.ndarray, others: np.ndarray,
-    load: np.ndarray,
+    ring: RingModel, deviations: np.ndarray, squares: np.ndarray, betas: np.ndarray, members: np.ndarray,
+    others: np.ndarray, load: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Return the other waves (m, r), complex, by a load (r,) and what deviations make of a family's (m, N)."""
-    added = ring.around("stiffness", found)
+    """Return the other waves (m, r), complex, due to a load (r,) and to the deviations' forces on a family (m, N)."""
+    added = ring.around("stiffness", deviations)
     rigid = np.diag(ring.squares[others]) + added[np.ix_(others, others)]
-    forces = load - betas @ added[np.ix_(own, others)]
+    forces = load - betas @ added[np.ix_(members, others)]
     solved = [
         np.linalg.solve(rigid - square * np.eye(len(others)), force)
         for square, force in zip(squares, forces, strict=True)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from vanedamp.files.record import Array, Record, declared
-from vanedamp.modal.algebra import symmetric_part, turns
+from vanedamp.modal.algebra import sector_rotations, symmetric_part
 from vanedamp.rom.checks import shaped, symmetric, unit
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.rom.ring.deviations import RingError
@@ -21,15 +21,15 @@ _Vectors = Annotated[np.ndarray, Array(("interface", "direction"))]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ring(Record):
-    """What reduced rings share: N sectors about an axis; sector j is sector 0 turned by 2 pi j / N."""
+class ReducedRing(Record):
+    """Base of reduced rings: N sectors about an axis; sector j is sector 0 rotated by 2 pi j / N."""
 
     sectors: int
     """N"""
     axis: Annotated[np.ndarray, Array(("direction",))]
     """unit vector"""
     point: Annotated[np.ndarray, Array(("direction",), "m")]
-    """of the axis"""
+    """a point of the axis"""
     modes: int
     """number of natural modes of the ring that `model` keeps"""
     interface: Annotated[tuple[str, ...], Array(("interface",), dtype=object)]
@@ -39,17 +39,17 @@ class Ring(Record):
     directions: _Vectors
     """this and the next three: as in ReducedModel, of sector 0"""
     normals: _Vectors
-    """across them, towards the bodies"""
+    """transverse to them, towards the bodies"""
     positions: Annotated[np.ndarray, Array(("interface", "direction"), "m")]
-    """places"""
+    """coordinates"""
     arms: Annotated[np.ndarray, Array(("interface",), "m")]
     """distances of bodies from the interface"""
     base_load: _Load
-    """of sector 0, by an acceleration of the base along x, y, z of its frame"""
+    """load of sector 0 by an acceleration of the base along x, y, z of its frame"""
     part_load: _Load
-    """what the part that deviates has of it"""
+    """load of the deviating part"""
     damping_ratio: float
-    """of every mode"""
+    """damping ratio of every mode"""
     provenance: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     """where the numbers come from (JSON-able); "estimate": of the error"""
 
@@ -60,11 +60,11 @@ class Ring(Record):
         lengths = {"interface": len(self.interface), "direction": 3, **self._lengths()}
         lengths["column"] = lengths["coordinate"]
         for item in fields(self):
-            name, layout, given = item.name, declared(type(self))[item.name][1], getattr(self, item.name)
-            if isinstance(layout, Array) and name != "interface" and (given is not None or item.default is not None):
+            name, layout, value = item.name, declared(type(self))[item.name][1], getattr(self, item.name)
+            if isinstance(layout, Array) and name != "interface" and (value is not None or item.default is not None):
                 shape = tuple(lengths[dimension] for dimension in layout.dims)
-                found = symmetric(name, given, shape[0]) if layout.dims == SQUARE else shaped(name, given, shape)
-                object.__setattr__(self, name, found)
+                final = symmetric(name, value, shape[0]) if layout.dims == SQUARE else shaped(name, value, shape)
+                object.__setattr__(self, name, final)
         object.__setattr__(self, "directions", unit(self.directions))
         super().__post_init__()
         if not self.interface:
@@ -90,7 +90,7 @@ class Ring(Record):
         """Return the whole ring in natural modes, with residual flexibility.
 
         squares (m,), shapes (n, m) of the modes in coordinates of the ring; rows (N k, n) of the interface and static
-        (n, N k), the response to its forces; load (n, 3) of the base; added (m, m) damping beside that of the ratio.
+        (n, N k), the response to its forces; load (n, 3) of the base; added (m, m) damping, besides the damping ratio.
         Raises RingError for a ring that can move freely, or is unstable.
         """
         if squares[0] <= 0.0:
@@ -112,7 +112,7 @@ class Ring(Record):
 
     def placed(self) -> dict[str, Any]:
         """Return labels, places and provenance of the whole ring, as fields of a ReducedModel."""
-        rotations = turns(self.axis, self.sectors)
+        rotations = sector_rotations(self.axis, self.sectors)
 
         def turned(vectors: np.ndarray) -> np.ndarray:
             return np.einsum("sij,kj->ski", rotations, vectors).reshape(-1, 3)

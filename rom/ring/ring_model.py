@@ -10,17 +10,17 @@ import numpy as np
 from scipy import linalg
 
 from vanedamp.files.record import Array
-from vanedamp.modal.algebra import added_by_speed, symmetric_part, turns
+from vanedamp.modal.algebra import added_by_speed, sector_rotations, symmetric_part
 from vanedamp.rom.dense_modes import modal_damping
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.families import Families
-from vanedamp.rom.ring.placement import SQUARE, Ring
+from vanedamp.rom.ring.placement import SQUARE, ReducedRing
 from vanedamp.rom.ring.waves import Waves
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RingModel(Ring):
+class RingModel(ReducedRing):
     """A reduced ring of N equal sectors: n real waves of modal mass 1, and one sector's fields in them.
 
     The first `modes` waves are natural modes of the tuned ring at standstill, whole pairs, which `reduce_ring` sorts by
@@ -34,15 +34,15 @@ class RingModel(Ring):
     squares: Annotated[np.ndarray, Array(("coordinate",), "rad^2/s^2")]
     """squared angular frequencies of the tuned ring at standstill"""
     stiffness: Annotated[np.ndarray, Array(SQUARE, "N/m")]
-    """of the part of a sector that deviates, in sector 0's fields"""
+    """stiffness of the deviating part of a sector, in sector 0's fields"""
     mass: Annotated[np.ndarray, Array(SQUARE, "kg")]
-    """of that part"""
+    """mass of that part"""
     centrifugal_stiffness: Annotated[np.ndarray | None, Array(SQUARE, "kg")] = None
-    """of the whole ring: what a squared speed (rad/s) adds; None: it does not rotate"""
+    """of the whole ring: added stiffness per squared speed (rad/s); None: it does not rotate"""
     higher_stiffness: Annotated[np.ndarray | None, Array(("power", *SQUARE), "N/m")] = None
     """of the whole ring: as in ReducedModel"""
     greatest_speed: float = 0.0
-    """up to which the waves hold [rad/s]"""
+    """speed up to which the waves hold [rad/s]"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -123,24 +123,24 @@ class RingModel(Ring):
         mass, stiffness = self.matrices(Deviations(), speed)
         numbers, squares, momenta, diameters = [], [], [], []
         for diameter in np.unique(self.diameters):
-            own = np.flatnonzero(self.diameters == diameter)
-            count = int(np.count_nonzero(own < self.modes))
-            found, shapes = linalg.eigh(
-                stiffness[np.ix_(own, own)], mass[np.ix_(own, own)], subset_by_index=[0, count - 1]
+            members = np.flatnonzero(self.diameters == diameter)
+            count = int(np.count_nonzero(members < self.modes))
+            eigenvalues, shapes = linalg.eigh(
+                stiffness[np.ix_(members, members)], mass[np.ix_(members, members)], subset_by_index=[0, count - 1]
             )
             paired = 0 < 2 * diameter < self.sectors
             numbers.append(np.arange(count) // (2 if paired else 1))
-            squares.append(found)
-            momenta.append((mass[:, own] @ shapes).T)
+            squares.append(eigenvalues)
+            momenta.append((mass[:, members] @ shapes).T)
             diameters.append(np.full(count, diameter))
         return Families(
             np.concatenate(numbers), np.concatenate(diameters), np.concatenate(squares), np.concatenate(momenta)
         )
 
     def added_damping(self, deviations: Deviations) -> np.ndarray | None:
-        """Return the damping (n, n) that deviations add to that of the ratio; None without such deviations.
+        """Return the damping (n, n) that deviations add to the damping ratio's; None without such deviations.
 
-        Of a part as stiff as the sector, the sum over sectors of what they add to is the modal damping of the waves.
+        For a part as stiff as the sector, their sum over sectors is added to the modal damping of the waves.
         """
         damping = deviations.of("damping", self.sectors)
         if not damping.any():
@@ -167,8 +167,8 @@ class RingModel(Ring):
     def _base_load(self, deviations: Deviations) -> np.ndarray:
         """Return the load (n, 3) of the whole ring by an acceleration of the base along x, y, z."""
         lighter = deviations.of("mass", self.sectors)[:, None, None]
-        own = self.waves.in_sectors(self.base_load.T) + lighter * self.waves.in_sectors(self.part_load.T)
-        return np.asarray(np.einsum("sai,sba->ib", own, turns(self.axis, self.sectors)))
+        loads = self.waves.in_sectors(self.base_load.T) + lighter * self.waves.in_sectors(self.part_load.T)
+        return np.asarray(np.einsum("sai,sba->ib", loads, sector_rotations(self.axis, self.sectors)))
 
     def _turning(self) -> dict[str, Any]:
         """Return the axis of rotation as fields of a ReducedModel; none of a ring that does not rotate."""

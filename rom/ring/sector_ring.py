@@ -12,12 +12,12 @@ from scipy import linalg, sparse
 
 from vanedamp.files import store
 from vanedamp.files.record import Array
-from vanedamp.modal.algebra import symmetric_part, turns
+from vanedamp.modal.algebra import sector_rotations, symmetric_part
 from vanedamp.rom.bases.projection import lowest_modes, superlu
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.families import Families
-from vanedamp.rom.ring.placement import SQUARE, Ring
+from vanedamp.rom.ring.placement import SQUARE, ReducedRing
 from vanedamp.rom.ring.ring_model import RingModel
 
 _Stiffness = Annotated[np.ndarray, Array(SQUARE, "N/m")]
@@ -26,7 +26,7 @@ _Stretch = Annotated[np.ndarray, Array(("spring", "coordinate"))]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SectorRing(Ring):
+class SectorRing(ReducedRing):
     """A ring of N equal sectors by component modes of one; matrices of the whole ring are sparse.
 
     The s coordinates of a sector are f motions of its face low, the same f of its face high, which are the next
@@ -47,9 +47,9 @@ class SectorRing(Ring):
     spring_high: _Stretch
     """with the next: stretch of springs between neighbours, spring_high q_j - spring_low q_(j+1)"""
     spring_low: _Stretch
-    """the same of the face low"""
+    """same for the face low"""
     spring_stiffness: Annotated[np.ndarray, Array(("spring",), "N/m")]
-    """of these springs"""
+    """stiffness of these springs"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -103,25 +103,25 @@ class SectorRing(Ring):
         return self.natural_model(squares, shapes, rows, factors.solve(rows.T), load, added), shapes
 
     def tuned_families(self, speed: float = 0.0) -> Families:
-        """Return the natural modes of the tuned ring diameter by diameter, and a family above those of `model`.
+        """Return the natural modes of the tuned ring by diameter, and a family above the families of `model`.
 
         Raises RingError for a speed.
         """
         if speed:
             raise RingError('speed: the ring is reduced sector by sector, at standstill; take basis = "modes"')
-        own = len(self.mass) - self.faces
-        count = min(-(-self.modes // self.sectors) + 1, own)
+        per_sector = len(self.mass) - self.faces
+        count = min(-(-self.modes // self.sectors) + 1, per_sector)
         mass = self.matrices(Deviations())[1]
         numbers, squares, shapes, diameters = [], [], [], []
         for diameter in range(self.sectors // 2 + 1):
-            found, waves = linalg.eigh(*self.of_diameter(diameter), subset_by_index=[0, count - 1])
+            eigenvalues, waves = linalg.eigh(*self.of_diameter(diameter), subset_by_index=[0, count - 1])
             around = np.exp(2j * np.pi / self.sectors * (diameter * np.arange(self.sectors) % self.sectors))
             fields = np.einsum("j,sm->mjs", around, waves).reshape(count, self.size)
             paired = 0 < 2 * diameter < self.sectors
-            parts = [fields.real, fields.imag] if paired else [fields.real]
-            shapes.append(np.concatenate(parts) * np.sqrt(len(parts) / self.sectors))
-            numbers.append(np.tile(np.arange(count), len(parts)))
-            squares.append(np.tile(found, len(parts)))
+            components = [fields.real, fields.imag] if paired else [fields.real]
+            shapes.append(np.concatenate(components) * np.sqrt(len(components) / self.sectors))
+            numbers.append(np.tile(np.arange(count), len(components)))
+            squares.append(np.tile(eigenvalues, len(components)))
             diameters.append(np.full(len(numbers[-1]), diameter))
         return Families(
             np.concatenate(numbers), np.concatenate(diameters), np.concatenate(squares),
@@ -149,39 +149,43 @@ class SectorRing(Ring):
         stiffness = self._summed(self.stiffness + softer * self.part_stiffness)
         if len(self.spring_stiffness):
             stretch = self._joined(np.broadcast_to(self.spring_high, (self.sectors, *self.spring_high.shape)))
-            other = np.broadcast_to(self.spring_low, (self.sectors, *self.spring_low.shape))
-            stretch = sparse.csr_array(stretch - self._joined(other, 1))
+            low = np.broadcast_to(self.spring_low, (self.sectors, *self.spring_low.shape))
+            stretch = sparse.csr_array(stretch - self._joined(low, 1))
             scaled = stretch * np.tile(self.spring_stiffness, self.sectors)[:, None]
             stiffness = sparse.csr_array(stiffness + stretch.T @ scaled)
         return stiffness, self._summed(self.mass + lighter * self.part_mass)
 
     def places(self) -> np.ndarray:
-        """Return the places (N, s) of the coordinates of every sector among those of the ring."""
-        own = len(self.mass) - self.faces
-        first = own * np.arange(self.sectors)[:, None]
+        """Return the indices (N, s) of the coordinates of every sector among the ring's coordinates."""
+        per_sector = len(self.mass) - self.faces
+        first = per_sector * np.arange(self.sectors)[:, None]
         face = np.arange(self.faces)
-        return np.hstack([first + face, np.roll(first, -1, axis=0) + face, first + np.arange(self.faces, own)])
+        return np.hstack([first + face, np.roll(first, -1, axis=0) + face, first + np.arange(self.faces, per_sector)])
 
     def _summed(self, blocks: np.ndarray) -> sparse.csr_array:
-        """Return the matrix of the ring from those of the sectors (N, s, s)."""
-        places = self.places()
-        rows, columns = (np.broadcast_to(one, blocks.shape) for one in (places[:, :, None], places[:, None, :]))
+        """Return the matrix of the ring from the sectors' matrices (N, s, s)."""
+        coordinates = self.places()
+        rows, columns = (
+            np.broadcast_to(indices, blocks.shape) for indices in (coordinates[:, :, None], coordinates[:, None, :])
+        )
         return sparse.csr_array((blocks.ravel(), (rows.ravel(), columns.ravel())), (self.size, self.size))
 
     def _joined(self, rows: np.ndarray, ahead: int = 0) -> sparse.csr_array:
-        """Return functionals (N k, size) of the ring from those of its sectors (N, k, s), or of the sectors ahead."""
-        places = np.roll(self.places(), -ahead, axis=0)
+        """Return functionals (N k, size) of the ring from those (N, k, s) of its sectors, or of the sectors ahead."""
+        coordinates = np.roll(self.places(), -ahead, axis=0)
         numbers = np.arange(rows.shape[0] * rows.shape[1]).reshape(rows.shape[:2])
-        at, columns = (np.broadcast_to(one, rows.shape) for one in (numbers[:, :, None], places[:, None, :]))
+        at, columns = (
+            np.broadcast_to(indices, rows.shape) for indices in (numbers[:, :, None], coordinates[:, None, :])
+        )
         return sparse.csr_array((rows.ravel(), (at.ravel(), columns.ravel())), (numbers.size, self.size))
 
     def _load(self, lighter: np.ndarray) -> np.ndarray:
         """Return the load (size, 3) of the ring by an acceleration of the base along x, y, z."""
-        own = self.base_load + lighter[:, None, None] * self.part_load
-        turned = np.einsum("nsa,nba->nsb", own, turns(self.axis, self.sectors))
-        found = np.zeros((self.size, 3))
-        np.add.at(found, self.places(), turned)
-        return found
+        sector_loads = self.base_load + lighter[:, None, None] * self.part_load
+        turned = np.einsum("nsa,nba->nsb", sector_loads, sector_rotations(self.axis, self.sectors))
+        load = np.zeros((self.size, 3))
+        np.add.at(load, self.places(), turned)
+        return load
 
 
 def load_ring(path: str | os.PathLike[str]) -> RingModel | SectorRing:

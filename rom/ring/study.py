@@ -12,7 +12,7 @@ from vanedamp.files.record import Array, Record
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.extremes import Weibull, quantile, weibull
 from vanedamp.rom.ring.families import Families
-from vanedamp.rom.ring.forced import Forced, Natural, OfModel, natural_of, participation
+from vanedamp.rom.ring.forced import Natural, OfModel, OrderResponse, natural_of, participation
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.rom.ring.whitehead import whitehead_bound
@@ -26,9 +26,9 @@ _MARGIN = 0.05
 class Amplification(NamedTuple):
     """Largest amplitude over the sectors of a mistuned ring, and over the tuned ring's.
 
-    factor        of the largest amplitude over the tuned one
-    sector        where it is
-    frequency_hz  at which it is
+    factor        largest amplitude over the tuned ring's
+    sector        of the largest amplitude
+    frequency_hz  of the largest amplitude
     amplitude     m/N
     participation number of sectors that take part in the response there (rom.ring.forced.participation)
     """
@@ -40,12 +40,12 @@ class Amplification(NamedTuple):
     participation: float
 
 
-class Table(Protocol):
-    """What draws deviations: a scene's or a case's table [mistuning], a dataclass."""
+class DeviationTable(Protocol):
+    """Source of drawn deviations: a scene's or a case's table [mistuning], a dataclass."""
 
     @property
     def seed(self) -> int:
-        """The seed of what is drawn."""
+        """Seed of the draw."""
 
     def deviations(self, sectors: int) -> Deviations:
         """Return deviations of so many sectors."""
@@ -69,11 +69,11 @@ class MistuningStudy(Record):
     orders: Annotated[np.ndarray, Array(_OverOrders, dtype=np.int64)]
     """engine orders"""
     seeds: Annotated[np.ndarray, Array(("seed",), dtype=np.int64)]
-    """of the draws"""
+    """seeds of the draws"""
     band_hz: Annotated[np.ndarray, Array(("edge",), "Hz")]
-    """between which peaks count: of all draws"""
+    """band in which peaks count, over all draws"""
     tuned_amplitude: Annotated[np.ndarray, Array(_OverOrders, "m/N")]
-    """largest of the tuned ring"""
+    """largest amplitude of the tuned ring"""
     tuned_frequency_hz: Annotated[np.ndarray, Array(_OverOrders, "Hz")]
     """where it is"""
     amplification: Annotated[np.ndarray, Array(_OverDraws)]
@@ -85,15 +85,15 @@ class MistuningStudy(Record):
     participation: Annotated[np.ndarray, Array(_OverDraws)]
     """sectors that take part in the response there: 1 to N"""
     frequencies_hz: Annotated[np.ndarray, Array(("frequency",), "Hz")]
-    """of the responses that follow"""
+    """frequencies of the following responses"""
     amplitude: Annotated[np.ndarray, Array(("order", "frequency", "sector"), "m/N")]
-    """of the first draw"""
+    """amplitude of the first draw"""
     amplitude_tuned: Annotated[np.ndarray, Array(("order", "frequency"), "m/N")]
-    """of the tuned ring"""
+    """amplitude of the tuned ring"""
     stiffness: _OfDraw
     """deviations of the first draw"""
     mass: _OfDraw
-    """the same of its masses"""
+    """mass deviations of the first draw"""
     damping: _OfDraw
     """the same of its damping"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -119,7 +119,7 @@ class MistuningStudy(Record):
         for index, order in enumerate(self.orders.tolist()):
             factors, fit = self.amplification[index], self.fit(index)
             worst = int(np.argmax(factors))
-            found = [(probability, *quantile(factors, probability)) for probability in PROBABILITIES]
+            quantiles = [(probability, *quantile(factors, probability)) for probability in PROBABILITIES]
             rows.append({
                 "order": order,
                 "tuned_amplitude": float(self.tuned_amplitude[index]),
@@ -131,7 +131,7 @@ class MistuningStudy(Record):
                 "quantiles": [
                     {"probability": probability, "value": value, "low": low, "high": high,
                      "weibull": None if fit is None else fit.quantile(probability)}
-                    for probability, value, low, high in found
+                    for probability, value, low, high in quantiles
                 ],
                 "weibull": None if fit is None else asdict(fit),
             })  # fmt: skip
@@ -156,7 +156,7 @@ def amplification(
 
 def mistuning_study(
     ring: RingModel | SectorRing,
-    table: Table,
+    table: DeviationTable,
     orders: Sequence[int],
     seeds: int | Sequence[int],
     label: str | None = None,
@@ -176,7 +176,7 @@ def mistuning_study(
     report   called with the number of draws done, and of all
 
     A ring that rotates turns past a load at rest: forces come earlier from sector to sector, in other rings later.
-    Raises RingError, and what the table raises.
+    Raises RingError, and the table's errors.
     """
     label = ring.interface[0] if label is None else label
     numbers = list(range(table.seed, table.seed + seeds)) if isinstance(seeds, int) else [int(seed) for seed in seeds]
@@ -187,11 +187,11 @@ def mistuning_study(
     waves = [-order if speed else order for order in orders]
     natural = natural_of(ring, speed=speed)
     nominal = [_Peak.of(search, natural, wave, label) for wave in waves]
-    bands, first, found = [search.band(natural)], None, []
+    bands, first, amplifications = [search.band(natural)], None, []
     for done, seed in enumerate(numbers):
         if report is not None:
             report(done, len(numbers))
-        deviations = cast("Table", replace(cast("Any", table), seed=seed)).deviations(ring.sectors)
+        deviations = cast("DeviationTable", replace(cast("Any", table), seed=seed)).deviations(ring.sectors)
         natural = natural_of(ring, deviations, speed)
         try:
             peaks = [_Peak.of(search, natural, wave, label) for wave in waves]
@@ -199,86 +199,86 @@ def mistuning_study(
             raise RingError(f"{error} (seed {seed})") from error
         first = first or (deviations, peaks)
         bands.append(search.band(natural))
-        found.append([_amplified(one, tuned) for one, tuned in zip(peaks, nominal, strict=True)])
+        amplifications.append([_amplified(peak, tuned) for peak, tuned in zip(peaks, nominal, strict=True)])
     assert first is not None
     drawn, peaks = first
-    columns = np.array(found, dtype=float).transpose(2, 1, 0)  # fields of Amplification, orders, draws
+    columns = np.array(amplifications, dtype=float).transpose(2, 1, 0)  # fields of Amplification, orders, draws
     band = np.array([min(low for low, _ in bands), max(high for _, high in bands)])
     frequencies = np.linspace(band[0], band[1], points)
     return MistuningStudy(
         sectors=ring.sectors, label=label, orders=np.array(orders), seeds=np.array(numbers),
-        band_hz=band, tuned_amplitude=np.array([one.amplitude for one in nominal]),
-        tuned_frequency_hz=np.array([one.frequency_hz for one in nominal]),
+        band_hz=band, tuned_amplitude=np.array([peak.amplitude for peak in nominal]),
+        tuned_frequency_hz=np.array([peak.frequency_hz for peak in nominal]),
         amplification=columns[0], worst_sector=columns[1], peak_frequency_hz=columns[2], participation=columns[4],
-        frequencies_hz=frequencies, amplitude=np.abs([one.response.at(frequencies) for one in peaks]),
-        amplitude_tuned=np.abs([one.response.at(frequencies)[:, 0] for one in nominal]),
+        frequencies_hz=frequencies, amplitude=np.abs([peak.response.at(frequencies) for peak in peaks]),
+        amplitude_tuned=np.abs([peak.response.at(frequencies)[:, 0] for peak in nominal]),
         **{name: drawn.of(name, ring.sectors) for name in ("stiffness", "mass", "damping")},
         provenance={"ring": dict(ring.provenance), "speed": speed},
     )  # fmt: skip
 
 
-class _Search(NamedTuple):
-    """Where peaks count: at the modes of a family, wherever a draw has them, or in a band, Hz, that is given."""
+class _PeakScope(NamedTuple):
+    """Where peaks count: at the modes of a family, wherever a draw has them, or in a given band, Hz."""
 
     families: Families
     family: int
-    given: tuple[float, float] | None
+    band_hz: tuple[float, float] | None
 
     def modes(self, natural: Natural | OfModel) -> np.ndarray | None:
         """Return the natural modes of the family; None: all."""
-        if self.given is not None:
+        if self.band_hz is not None:
             return None
-        own = np.flatnonzero(self.families.of_modes(natural.shapes) == self.family)
-        if not len(own):
+        members = np.flatnonzero(self.families.of_modes(natural.shapes) == self.family)
+        if not len(members):
             raise RingError(f"family: deviations leave no mode of family {self.family + 1}; give band_hz")
-        return own
+        return members
 
     def band(self, natural: Natural | OfModel) -> tuple[float, float]:
         """Return the edges of the band, Hz, given or about the modes of the family."""
         modes = self.modes(natural)
         if modes is None:
-            assert self.given is not None
-            return self.given
-        own = np.sqrt(natural.squares[modes]) / (2.0 * np.pi)
-        return float((1.0 - _MARGIN) * own.min()), float((1.0 + _MARGIN) * own.max())
+            assert self.band_hz is not None
+            return self.band_hz
+        frequencies = np.sqrt(natural.squares[modes]) / (2.0 * np.pi)
+        return float((1.0 - _MARGIN) * frequencies.min()), float((1.0 + _MARGIN) * frequencies.max())
 
 
-def _search(ring: RingModel | SectorRing, family: int, band_hz: Sequence[float] | None, speed: float) -> _Search:
+def _search(ring: RingModel | SectorRing, family: int, band_hz: Sequence[float] | None, speed: float) -> _PeakScope:
     """Return where peaks count. Raises RingError for a family that the ring does not have."""
-    families, kept = ring.tuned_families(speed), ring.modes // ring.sectors
+    families, count = ring.tuned_families(speed), ring.modes // ring.sectors
     if band_hz is not None:
-        return _Search(families, 0, (float(band_hz[0]), float(band_hz[1])))
-    if not 0 <= family < kept:
-        raise RingError(f"family: the ring has families 0 to {kept - 1}, not {family}")
-    return _Search(families, family, None)
+        return _PeakScope(families, 0, (float(band_hz[0]), float(band_hz[1])))
+    if not 0 <= family < count:
+        raise RingError(f"family: the ring has families 0 to {count - 1}, not {family}")
+    return _PeakScope(families, family, None)
 
 
 class _Peak(NamedTuple):
     """The largest peak of a ring's response to an engine order."""
 
-    response: Forced
+    response: OrderResponse
     amplitude: float
     sector: int
     frequency_hz: float
 
     @classmethod
-    def of(cls, search: _Search, natural: Natural | OfModel, order: int, label: str) -> _Peak:
+    def of(cls, search: _PeakScope, natural: Natural | OfModel, order: int, label: str) -> _Peak:
         """Return the largest peak where peaks count.
 
-        Raises RingError where there is none, or where a band cuts what is larger.
+        Raises RingError where there is none, or where the response is larger at an end of the band.
         """
         response, band = natural.forced(order, label), search.band(natural)
         amplitudes, frequencies = response.peaks(*band, search.modes(natural))
         if np.all(np.isnan(amplitudes)):
-            told, remedy = f"of family {search.family + 1}", "take another family (--family), or"
-            if search.given:
-                told, remedy = f"between {band[0]:.6g} and {band[1]:.6g} Hz", "take another band_hz, or"
+            scope, remedy = f"of family {search.family + 1}", "take another family (--family), or"
+            if search.band_hz:
+                scope, remedy = f"between {band[0]:.6g} and {band[1]:.6g} Hz", "take another band_hz, or"
             raise RingError(
-                f"label: {label!r} has no peak {told} under order {abs(order)}; {remedy} an interface coordinate that "
+                f"label: {label!r} has no peak {scope} under order {abs(order)}; {remedy} an interface coordinate that "
                 "its modes move"
             )
         sector = int(np.nanargmax(amplitudes))
-        if search.given and np.abs(response.at(np.array(band))).max() > amplitudes[sector]:
+        if search.band_hz and np.abs(response.at(np.array(band))).max() > amplitudes[sector]:
             raise RingError(
                 f"band_hz: under order {abs(order)}, the response is larger at an end of the band "
                 "than at any peak in it; take a band whose ends are apart from resonances"

@@ -1,4 +1,4 @@
-"""Real waves around a ring of equal sectors, and what a sector's matrices make of them.
+"""Real waves around a ring of equal sectors, and a sector's matrices in them.
 
 A field of nodal diameter h moves sector j, in its own frame, by Re(z exp(i h j alpha)), alpha = 2 pi / N. For 0 < h <
 N/2, its real and imaginary part are two waves: sector j sees the coordinates (c, s) of the pair turned by theta = h j
@@ -45,26 +45,26 @@ class Waves:
     @cached_property
     def _travelling(self) -> sparse.csr_array:
         """(n, n) unitary: the coordinates of the travelling waves."""
-        place, second = np.arange(len(self.diameters)), self._second
+        index, second = np.arange(len(self.diameters)), self._second
         first, pair = np.flatnonzero(second == 1), np.flatnonzero(second == 2)
-        rows = np.concatenate([place, pair, first])
-        columns = np.concatenate([place, first, pair])
-        own = np.where(second == 0, 1.0 + 0j, np.where(second == 1, 1.0, -1j) * np.sqrt(0.5))
-        values = np.concatenate([own, np.full(len(pair), 1j), np.full(len(first), 1.0)])
-        values[len(place) :] *= np.sqrt(0.5)
-        return sparse.csr_array((values, (rows, columns)), (len(place),) * 2)
+        rows = np.concatenate([index, pair, first])
+        columns = np.concatenate([index, first, pair])
+        diagonal = np.where(second == 0, 1.0 + 0j, np.where(second == 1, 1.0, -1j) * np.sqrt(0.5))
+        values = np.concatenate([diagonal, np.full(len(pair), 1j), np.full(len(first), 1.0)])
+        values[len(index) :] *= np.sqrt(0.5)
+        return sparse.csr_array((values, (rows, columns)), (len(index),) * 2)
 
     def at_sector(self, rows: np.ndarray, sector: int) -> np.ndarray:
-        """Return functionals of the fields of a sector, (k, n), for those of another one: (k, n).
+        """Return functionals (k, n) of the fields of another sector, from those of a sector.
 
-        Of sector -j, rows of coordinates become those that sector j sees.
+        For sector -j, rows of coordinates become the coordinates seen from sector j.
         """
         phases = np.exp(2j * np.pi / self.sectors * (sector * self.wavenumbers % self.sectors))
         turned = self._travelling @ sparse.csr_array(sparse.diags(phases)) @ self._travelling.conj().T
         return np.asarray(rows @ turned.real)
 
     def in_sectors(self, rows: np.ndarray) -> np.ndarray:
-        """Return functionals of the fields of a sector, (k, n), for those of every sector: (N, k, n)."""
+        """Return functionals (N, k, n) of the fields of every sector, from those (k, n) of a sector."""
         return np.stack([self.at_sector(rows, sector) for sector in range(self.sectors)])
 
     def travelling(self, matrix: np.ndarray) -> np.ndarray:
@@ -75,5 +75,5 @@ class Waves:
         """Return the sum over sectors (n, n) of a symmetric matrix of `travelling`, with weights (N,)."""
         transform = np.conj(np.fft.fft(weights))
         steps = (self.wavenumbers[None, :] - self.wavenumbers[:, None]) % self.sectors
-        found = (self._travelling @ (travelling * transform[steps]) @ self._travelling.conj().T).real
-        return np.asarray(0.5 * (found + found.T))
+        matrix = (self._travelling @ (travelling * transform[steps]) @ self._travelling.conj().T).real
+        return np.asarray(0.5 * (matrix + matrix.T))

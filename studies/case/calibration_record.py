@@ -10,7 +10,7 @@ import numpy as np
 
 from vanedamp.files.record import Array, Record, empty
 from vanedamp.modal.frf import UNITS
-from vanedamp.modal.rigid_model import CavityMotion, RigidModel
+from vanedamp.modal.rigid_model import ModalCavityMotion, RigidModel
 
 _OfTargets = Annotated[np.ndarray, Array(("target",))]
 _OfParts = Annotated[np.ndarray, Array(("part",))]
@@ -35,7 +35,7 @@ class CalibrationRecord(Record):
     excitation: Mapping[str, Any] | None = None
     """"force" (N) that gives at resonance the "amplitude" (m) for a "share" of the fatigue strength at the "hot_spot";
     None without a fatigue strength"""
-    cavity: Mapping[str, CavityMotion] = field(default_factory=dict)
+    cavity: Mapping[str, ModalCavityMotion] = field(default_factory=dict)
     """how the mode moves the cavities"""
     warnings: Annotated[tuple[str, ...], Array(("warning",), attribute=True)] = ()
     """to be read before results are used"""

@@ -10,7 +10,7 @@ from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.modal.cyclic_rotation import gyroscopic_ring_modes
 from vanedamp.modal.eigen import factorize
 from vanedamp.modal.records.ring_modes import RingModes
-from vanedamp.rom.ring.reduction import Part, reduce_ring
+from vanedamp.rom.ring.reduction import DeviatingPart, reduce_ring
 from vanedamp.rom.ring.ring_model import RingModel
 from vanedamp.rom.ring.sector_ring import SectorRing
 from vanedamp.studies.case.stages import MODES, interface
@@ -64,7 +64,7 @@ def ring_reduction(
     standing = structure.matrices if structure.turning is None else structure.turning.standing
     return reduce_ring(
         case.ring.sector(standing, case.rotation), interface(case, standing), families, max_frequency,
-        Part(*structure.solid.part(case.ring.deviating)) if case.ring.deviating else None,
+        DeviatingPart(*structure.solid.part(case.ring.deviating)) if case.ring.deviating else None,
         None if rotating is None else rotating.centrifugal_stiffness, greatest, factorize, report, basis,
         () if rotating is None else rotating.higher,
     )  # fmt: skip

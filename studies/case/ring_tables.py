@@ -91,9 +91,9 @@ class RingTable:
 
     def sector(self, matrices: SystemMatrices, rotation: RotationTable | None) -> CyclicSector:
         """Return the sector with these matrices; rotation: has the axis unless the table does. Raises CyclicError."""
-        from vanedamp.modal.cyclic import Spring, cyclic_sector
+        from vanedamp.modal.cyclic import SectorSpring, cyclic_sector
 
-        springs = [Spring(spring.low, spring.high, spring.stiffness) for spring in self.spring]
+        springs = [SectorSpring(spring.low, spring.high, spring.stiffness) for spring in self.spring]
         return cyclic_sector(
             matrices, self.low, self.high, self.sectors, *self._axis(rotation), springs, self.tolerance
         )

@@ -32,7 +32,7 @@ from vanedamp.modal.multiple import rivals, turned
 from vanedamp.modal.participation import NOTABLE_SHARE, ParticipationError, effective_masses, first_bending
 from vanedamp.modal.records.campbell import Campbell
 from vanedamp.modal.records.modes import Modes
-from vanedamp.modal.rigid_model import CavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
+from vanedamp.modal.rigid_model import ModalCavityMotion, RigidModel, cavity_motion, fatigue_amplitude, rigid_model
 from vanedamp.modal.statics import Statics
 from vanedamp.modal.stress import HotSpot, PeakStress, hot_spot, nodal_von_mises, peak_stresses
 from vanedamp.modal.temperature import Temperature
@@ -231,7 +231,7 @@ class ModalAnalysis:
     effective_mass: np.ndarray
     first_bending: int | None
     rigid: RigidModel | None
-    cavities: dict[str, CavityMotion]
+    cavities: dict[str, ModalCavityMotion]
     functional: np.ndarray | None
     fatigue: FatigueLevel | None
     warnings: tuple[str, ...]
@@ -322,7 +322,7 @@ def modal_analysis(structure: Structure) -> ModalAnalysis:
     started = time.perf_counter()
     case, matrices = structure.case, structure.matrices
     label, rigid, fatigue = case.response_label, None, None
-    cavities: dict[str, CavityMotion] = {}
+    cavities: dict[str, ModalCavityMotion] = {}
     functional = None if label is None else _functional(case, matrices, label)
     modes = _modes(case, matrices, functional)
     bending, warnings = _first_bending(case, modes, matrices)
@@ -376,7 +376,7 @@ def strength_warnings(structure: Structure) -> tuple[str, ...]:
 
 def _cavities(
     case: Case, matrices: SystemMatrices, shape: np.ndarray, functional: np.ndarray
-) -> dict[str, CavityMotion]:
+) -> dict[str, ModalCavityMotion]:
     """Return the motion of the case's cavities in a mode, without cavities that do not move along their direction."""
     planar = [label for label, table in case.interface.items() if table.planar]
     motions = {label: cavity_motion(shape, interface(case, matrices, [label]).vectors, functional) for label in planar}

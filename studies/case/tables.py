@@ -31,7 +31,7 @@ from vanedamp.files.toml_input import (
     validate,
 )
 from vanedamp.meshes import benchmarks, sector, vane_cluster
-from vanedamp.meshes.benchmarks import Block
+from vanedamp.meshes.benchmarks import TaperedBlock
 from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.meshes.sector import Sector
 from vanedamp.modal.units import absurdity, strength_absurdity
@@ -108,7 +108,7 @@ class BlockMesh(_Generated):
 
     generator: Literal["block"]
     """"block": a rod, beam or plate for verification"""
-    parameters: Block
+    parameters: TaperedBlock
     degree: Degree = 2
     """polynomial degree of the displacements"""
 
@@ -135,7 +135,7 @@ FILES = (
 )
 
 #: the records of the generators' parameters
-GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": Block, "sector": Sector}
+GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": TaperedBlock, "sector": Sector}
 _BUILD: dict[str, Callable[[Any, str | Path], Path]] = {
     "vane_cluster": vane_cluster.build,
     "block": benchmarks.build,

@@ -17,7 +17,7 @@ import pytest
 from tests.tools.input_files import DAMPED_BLOCK, SCENE, rom_scene
 from tests.tools.processes import ROOT, environment, vanedamp, without_stages
 from vanedamp.files.store import StoreError, Variable, load, replacing, save
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.matrix_files import FILES
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import BAD_INPUT, main
@@ -90,7 +90,7 @@ def _rom_scene(folder):
 
 
 def _mesh_case(folder):
-    build(Block(0.1, 0.02, 0.01, divisions=(2, 1, 1)), folder / "block.msh")
+    build(TaperedBlock(0.1, 0.02, 0.01, divisions=(2, 1, 1)), folder / "block.msh")
     rest = DAMPED_BLOCK.split("[material.default]")[1]
     (folder / "mesh.toml").write_text('[mesh]\nfile = "block.msh"\n[material.default]' + rest)
     (folder / "shapes.csv").write_text("precious")

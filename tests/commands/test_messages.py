@@ -10,7 +10,7 @@ from tests.tools.input_files import BLOCK, SCENE, changed
 from tests.tools.processes import until, without_stages
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.meshes.benchmarks import Block
+from vanedamp.meshes.benchmarks import TaperedBlock
 from vanedamp.meshes.parameters import ParameterError, VaneCluster
 from vanedamp.studies import terminal
 from vanedamp.studies.cli import BAD_INPUT, main
@@ -150,9 +150,9 @@ def test_elements_beyond_memory():
     with pytest.raises(ParameterError, match=r"element_size: 1e-06 m makes about 2\.[0-9]e\+14 elements; at most"):
         VaneCluster(element_size=1e-6)
     with pytest.raises(ParameterError, match="element_size: 1e-06 m"):
-        Block(0.1, 0.02, 0.01, element_size=1e-6)
+        TaperedBlock(0.1, 0.02, 0.01, element_size=1e-6)
     with pytest.raises(ParameterError, match="divisions: about 6e"):
-        Block(0.1, 0.02, 0.01, divisions=(1000, 1000, 1000))
+        TaperedBlock(0.1, 0.02, 0.01, divisions=(1000, 1000, 1000))
 
 
 def test_the_size_that_is_proposed_is_taken():

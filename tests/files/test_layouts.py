@@ -10,7 +10,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import vanedamp as vd
-from vanedamp.files.record import Array, Named, Paths, Record, Rows, Sparse, Unit, Within, empty
+from vanedamp.files.record import Array, Named, NumberUnit, Paths, Record, RecordRows, SparseMatrix, Within, empty
 from vanedamp.files.store import StoreError, load, load_any, save
 from vanedamp.rom.ring.identification import Identified
 
@@ -19,9 +19,9 @@ DENSE = np.array([[2.0, 0.0, 1.0], [0.0, 0.0, 0.0], [4.0, 3.0, 0.0]])
 
 @dataclass(frozen=True)
 class Hit:
-    time: Annotated[float, Unit("s")]
+    time: Annotated[float, NumberUnit("s")]
     side: str = ""
-    loss: Annotated[float, Unit("J")] = 0.0
+    loss: Annotated[float, NumberUnit("J")] = 0.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,13 +35,13 @@ class Inner(Record):
 class Outer(Record):
     KIND: ClassVar[str] = "outer"
     IN_JSON = ("inner", "axes", "speed", "hits")
-    matrix: Annotated[Any, Sparse("kg")]
+    matrix: Annotated[Any, SparseMatrix("kg")]
     axes: Annotated[
         Mapping[str, np.ndarray], Paths(lambda path: path.replace(".", "_"), lambda path: f"unit of {path}")
     ]
     drawn: Annotated[Mapping[str, np.ndarray], Paths(str.upper, lambda _: "m", "sample", "number")]
     inner: Annotated[Inner | None, Within(("height", "bodies"))] = None
-    hits: Annotated[tuple[Hit, ...], Rows("hit")] = ()
+    hits: Annotated[tuple[Hit, ...], RecordRows("hit")] = ()
     speed: Annotated[float | None, Named("at_speed")] = None
     ends: Annotated[tuple[float, float] | None, Array(("end",), attribute=True)] = None
     response: Annotated[np.ndarray, Array(("line", "body"), "of its quantity")] = field(default_factory=empty)

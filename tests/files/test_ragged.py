@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 import pytest
 
-from vanedamp.files.record import Array, Columns, Ragged, Record, Rows, Unit, joined
+from vanedamp.files.record import Array, NamedArrays, NumberUnit, Ragged, Record, RecordRows, joined
 
 
 class Known(NamedTuple):
@@ -18,7 +18,7 @@ class Known(NamedTuple):
 
 @dataclass(frozen=True)
 class Mark:
-    place: Annotated[float, Unit("m")]
+    place: Annotated[float, NumberUnit("m")]
     note: str
     state: Annotated[np.ndarray, Array(("coordinate",))]
 
@@ -32,9 +32,9 @@ class Piece:
     growth: Annotated[np.ndarray, Array(("point",), dtype=complex)]
     known: Annotated[np.ndarray, Array(("point",), dtype=bool)]
     quantities: Annotated[
-        Mapping[str, np.ndarray], Columns(lambda: {"work": Known("J"), "share": Known("1", ("loss",))})
+        Mapping[str, np.ndarray], NamedArrays(lambda: {"work": Known("J"), "share": Known("1", ("loss",))})
     ]
-    marks: Annotated[tuple[Mark, ...], Rows("mark")]
+    marks: Annotated[tuple[Mark, ...], RecordRows("mark")]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -2,17 +2,17 @@
 
 import pytest
 
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.meshes.vane_cluster import ParameterError
 from vanedamp.modal.elasticity import Material, assemble
 
 UNIT_DENSITY = {"default": Material(young=1.0, poisson=0.25, density=1.0)}
 
 SHAPES = [
-    Block(2.0, 0.4, 0.3, divisions=(3, 2, 1)),
-    Block(2.0, 0.4, 0.3, divisions=(3, 2, 1), hexahedra=True),
-    Block(2.0, 0.4, 0.3, tip_width=0.2, divisions=(3, 2, 1), hexahedra=True),
-    Block(2.0, 0.4, 0.3, tip_width=0.2, element_size=0.3),
+    TaperedBlock(2.0, 0.4, 0.3, divisions=(3, 2, 1)),
+    TaperedBlock(2.0, 0.4, 0.3, divisions=(3, 2, 1), hexahedra=True),
+    TaperedBlock(2.0, 0.4, 0.3, tip_width=0.2, divisions=(3, 2, 1), hexahedra=True),
+    TaperedBlock(2.0, 0.4, 0.3, tip_width=0.2, element_size=0.3),
 ]
 
 
@@ -46,4 +46,4 @@ def test_volume_and_faces(block, tmp_path):
 )
 def test_refuses_by_name(changes, name):
     with pytest.raises(ParameterError, match=f"^{name}: "):
-        Block(**({"length": 1.0, "width": 1.0, "thickness": 1.0} | changes))
+        TaperedBlock(**({"length": 1.0, "width": 1.0, "thickness": 1.0} | changes))

@@ -6,7 +6,7 @@ from scipy import linalg
 from scipy.sparse.linalg import spsolve
 
 from tests.tools.small_structures import rod
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.base_excitation import BaseExcitationError, base_response
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
@@ -19,7 +19,7 @@ RATIO = 0.01
 
 @pytest.fixture(scope="module")
 def beam(tmp_path_factory):
-    block = Block(0.3, 0.03, 0.02, divisions=(6, 1, 1), hexahedra=True)
+    block = TaperedBlock(0.3, 0.03, 0.02, divisions=(6, 1, 1), hexahedra=True)
     path = build(block, tmp_path_factory.mktemp("beam") / "b.msh")
     return assemble(path, {"default": STEEL}, {"root": "xyz"}, damping_ratio=RATIO)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.validation.modes import FV32, SDLS01, square_plate, tapered_membrane
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import factorize, solve_modes
 from vanedamp.modal.elasticity import Material, Solid
 from vanedamp.modal.matrices import patch_average
@@ -41,7 +41,7 @@ def test_cantilever_square_plate(tmp_path):
 def bending_stress_errors(path, cells, shape_of, stress_at):
     """Largest relative error of the von Mises stress of a cantilever's top and bottom, away from clamp and tip."""
     length, width, height = 1.0, 0.06, 0.05
-    block = Block(length, width, height, divisions=(4 * cells, 1, cells), hexahedra=True)
+    block = TaperedBlock(length, width, height, divisions=(4 * cells, 1, cells), hexahedra=True)
     solid = Solid(build(block, path), {"default": Material(2e11, 0.3, 8000.0)}, degree=2)
     matrices = solid.assemble({"root": "xyz"}, 0.0)
     tip = patch_average(matrices, "tip", [0, 0, 1])

@@ -10,7 +10,7 @@ from tests.tools.ring_mesh import write_ring, write_wedge
 from tests.tools.small_structures import turned
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.algebra import rotation
-from vanedamp.modal.cyclic import Spring, aliased, cyclic_sector
+from vanedamp.modal.cyclic import SectorSpring, aliased, cyclic_sector
 from vanedamp.modal.cyclic_faces import CyclicError
 from vanedamp.modal.cyclic_modes import ring_modes
 from vanedamp.modal.cyclic_response import tuned_response
@@ -178,13 +178,13 @@ def test_separate_structures_with_springs_are_the_ring_with_its_springs():
         stiffness[nxt, :3, j, 3:] -= block
     size = 6 * sectors
     known = np.sqrt(linalg.eigvalsh(stiffness.reshape(size, size), mass.reshape(size, size)))
-    sector = cyclic_sector(one, None, None, sectors, couplings=[Spring("left", "right", spring)])
+    sector = cyclic_sector(one, None, None, sectors, couplings=[SectorSpring("left", "right", spring)])
     assert every(ring_modes(sector, 6)) == pytest.approx(known / (2 * np.pi), rel=1e-10)
 
 
 def test_springs_to_the_neighbour_on_the_other_side_are_rejected():
     with pytest.raises(CyclicError, match=r"ring.spring.low: low and high are swapped: .* 'left' is nearer to 'right'"):
-        cyclic_sector(block_of_springs(5), None, None, 5, couplings=[Spring("right", "left", (1.0, 1.0, 1.0))])
+        cyclic_sector(block_of_springs(5), None, None, 5, couplings=[SectorSpring("right", "left", (1.0, 1.0, 1.0))])
 
 
 def corner(angle=30.0, lift=0.0, more=()):
@@ -249,7 +249,7 @@ def test_more_of_what_makes_no_ring():
     with pytest.raises(CyclicError, match="order: expected a whole number of at least 0, not -1"):
         aliased(-1, 12)
     with pytest.raises(CyclicError, match=r"ring.spring.stiffness: expected N/m along x, y, z, not \(0.0, 0.0, 0.0\)"):
-        Spring("low", "high", (0.0, 0.0, 0.0))
+        SectorSpring("low", "high", (0.0, 0.0, 0.0))
     assert cyclic_sector(moved(corner(), 5, [0, 0, 1e-3]), "low", "high", 12, tolerance=1e-3).distance == (
         pytest.approx(1e-3)
     )

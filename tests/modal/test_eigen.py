@@ -11,7 +11,7 @@ from scipy.sparse.linalg import eigsh, spsolve
 
 from tests.tools.processes import environment
 from tests.tools.small_structures import truss
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal import petsc
 from vanedamp.modal.eigen import SolverError, count_below, factorize, solve_modes
 from vanedamp.modal.elasticity import Material, assemble
@@ -41,13 +41,13 @@ def matrices_of(block, path, clamped, material=STEEL, degree=2):
 @pytest.fixture(scope="module")
 def beam(tmp_path_factory):
     """A clamped beam whose three principal directions differ."""
-    block = Block(1.0, 0.08, 0.05, divisions=(6, 1, 1), hexahedra=True)
+    block = TaperedBlock(1.0, 0.08, 0.05, divisions=(6, 1, 1), hexahedra=True)
     return matrices_of(block, tmp_path_factory.mktemp("beam"), {"root": "xyz"})
 
 
 @pytest.fixture(scope="module")
 def free_block(tmp_path_factory):
-    block = Block(0.4, 0.15, 0.1, divisions=(3, 2, 1), hexahedra=True)
+    block = TaperedBlock(0.4, 0.15, 0.1, divisions=(3, 2, 1), hexahedra=True)
     return matrices_of(block, tmp_path_factory.mktemp("free"), {})
 
 
@@ -159,7 +159,7 @@ def test_no_copy_of_a_multiple_frequency_is_missed(count):
 def test_pairs_of_a_square_section(tmp_path):
     """Bending about two axes: pairs of equal frequencies, both found and orthonormal, nearly equal ones told apart."""
     for width, spread in ((0.05, 1e-9), (0.05 * (1 + 1e-5), 1e-4)):
-        block = Block(0.5, width, 0.05, divisions=(8, 1, 1), hexahedra=True)
+        block = TaperedBlock(0.5, width, 0.05, divisions=(8, 1, 1), hexahedra=True)
         beam = matrices_of(block, tmp_path, {"root": "xyz"})
         modes = solve_modes(beam, 7)
         assert np.ptp(modes.frequencies_hz[[0, 1]]) < spread * modes.frequencies_hz[0]
@@ -191,7 +191,7 @@ def test_some_of_the_rigid_modes(free_block, count):
 
 
 def test_a_body_on_rollers_keeps_three_rigid_modes(tmp_path):
-    block = Block(0.4, 0.15, 0.1, divisions=(3, 2, 1), hexahedra=True)
+    block = TaperedBlock(0.4, 0.15, 0.1, divisions=(3, 2, 1), hexahedra=True)
     sliding = solve_modes(matrices_of(block, tmp_path, {"bottom": "z"}), 5).frequencies_hz
     assert np.all(sliding[:3] < 1e-3)
     assert sliding[3] > 100.0
@@ -247,7 +247,7 @@ def test_bar_converges_at_the_rate_of_its_degree(tmp_path, degree, hexahedra):
     clamped = {"root": "xyz", "left": "yz", "right": "yz", "bottom": "yz", "top": "yz"}
     errors = []
     for cells in (2, 4, 8):
-        block = Block(1.0, 0.1, 0.1, divisions=(cells, 1, 1), hexahedra=hexahedra)
+        block = TaperedBlock(1.0, 0.1, 0.1, divisions=(cells, 1, 1), hexahedra=hexahedra)
         bar = matrices_of(block, tmp_path, clamped, Material(1.0, 0.0, 1.0), degree)
         errors.append(solve_modes(bar, 1).frequencies_hz[0] / 0.25 - 1.0)
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -279,7 +279,7 @@ def test_cantilever_beam_converges_to_timoshenko(tmp_path):
     exact = timoshenko_cantilever(1.0, 0.1, 1.0, 1.0, 5.0 / 6.0)
     errors = []
     for cells in (4, 8, 16):
-        block = Block(1.0, 0.1, 0.1, divisions=(cells, 2, 2), hexahedra=True)
+        block = TaperedBlock(1.0, 0.1, 0.1, divisions=(cells, 2, 2), hexahedra=True)
         beam = matrices_of(block, tmp_path, {"root": "xyz"}, Material(1.0, 0.0, 1.0))
         modes = solve_modes(beam, 4)
         first = first_bending(modes, beam, [0, 1, 0])

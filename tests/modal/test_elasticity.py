@@ -4,11 +4,11 @@ import h5py
 import numpy as np
 import pytest
 
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid, assemble
 
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
-BLOCK = Block(0.3, 0.2, 0.1, tip_width=0.1, element_size=0.08)
+BLOCK = TaperedBlock(0.3, 0.2, 0.1, tip_width=0.1, element_size=0.08)
 
 
 @pytest.fixture(scope="module", params=[1, 2])

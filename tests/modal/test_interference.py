@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.tools.plate_rings import plate_waves
-from vanedamp.modal.records.campbell import Crossing
+from vanedamp.modal.records.campbell import OrderCrossing
 from vanedamp.modal.records.interference import Interference
 
 
@@ -51,7 +51,9 @@ def test_meetings_at_constant_frequencies():
 
 def test_meetings_of_a_campbell_diagram():
     """Its crossings, of which those within the range of operation are in operation."""
-    crossings = tuple(Crossing(mode, 2.0, speed, speed / np.pi) for mode, speed in ((2, 100.0), (3, 250.0), (2, 400.0)))
+    crossings = tuple(
+        OrderCrossing(mode, 2.0, speed, speed / np.pi) for mode, speed in ((2, 100.0), (3, 250.0), (2, 400.0))
+    )
     found = Interference(plate_waves(8), operating=(200.0, 300.0), speeds=[0.0, 500.0],
                             over_speed_hz=np.ones((10, 2)), crossings=crossings)  # fmt: skip
     assert found.meetings == crossings and found.in_operation == crossings[1:2]
@@ -73,7 +75,7 @@ def test_waves_that_turn_apart_are_met_by_their_own_orders():
 def test_file_keeps_it(tmp_path):
     modes = plate_waves(8)
     given = Interference(modes, [3, 5], speed=200.0, operating=(190.0, 210.0), speeds=[0.0, 100.0],
-                            over_speed_hz=np.ones((10, 2)), crossings=(Crossing(2, 3.0, 60.0, 28.6),))  # fmt: skip
+                            over_speed_hz=np.ones((10, 2)), crossings=(OrderCrossing(2, 3.0, 60.0, 28.6),))  # fmt: skip
     given.save(tmp_path / "ring.h5")
     found = Interference.load(tmp_path / "ring.h5")
     assert found.to_json() == given.to_json() and found.orders == (3, 5)

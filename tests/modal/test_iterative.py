@@ -11,7 +11,7 @@ from scipy import sparse
 from tests.modal.test_lanczos import rod
 from tests.tools.small_structures import truss
 from tests.tools.two_cubes_mesh import write_boxes
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal import davidson, fenicsx
 from vanedamp.modal.eigen import SolverError, solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid, assemble
@@ -21,7 +21,7 @@ from vanedamp.modal.matrices import MatricesError, SystemMatrices
 from vanedamp.modal.petsc import Product, factorize
 
 STEEL = {"default": Material(young=2.1e11, poisson=0.3, density=7800.0)}
-PLATE = Block(0.3, 0.2, 0.02, element_size=0.04)
+PLATE = TaperedBlock(0.3, 0.2, 0.02, element_size=0.04)
 #: supports of a plate, and its springs
 HELD = {
     "clamped": ({"root": "xyz"}, {}),
@@ -64,7 +64,7 @@ def test_matrices_of_which_the_vertices_are_unknown(held, tmp_path):
 
 @pytest.mark.parametrize("hexahedra", [False, True])
 def test_bricks_and_tetrahedra(hexahedra, tmp_path):
-    block = Block(0.5, 0.06, 0.05, divisions=(16, 3, 2), hexahedra=hexahedra)
+    block = TaperedBlock(0.5, 0.06, 0.05, divisions=(16, 3, 2), hexahedra=hexahedra)
     agree(assemble(build(block, tmp_path / "beam.msh"), STEEL, {"root": "xyz"}))
 
 
@@ -132,7 +132,7 @@ def test_a_solver_that_does_not_exist():
 @pytest.mark.parametrize("hexahedra", [False, True])
 @pytest.mark.parametrize("degree", [2, 3])
 def test_vertices_carry_linear_fields_to_the_nodes(degree, hexahedra, tmp_path):
-    path = build(Block(1.0, 0.5, 0.4, divisions=(3, 2, 2), hexahedra=hexahedra), tmp_path / "block.msh")
+    path = build(TaperedBlock(1.0, 0.5, 0.4, divisions=(3, 2, 2), hexahedra=hexahedra), tmp_path / "block.msh")
     solid = Solid(path, STEEL, degree)
     weights = solid.assemble({}, 0.0).vertices
     at = fenicsx.node_coordinates(fenicsx.vector_space(solid.domain.mesh, 1))

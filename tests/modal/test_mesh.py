@@ -11,7 +11,7 @@ from scipy.sparse.linalg import spsolve
 
 from tests.tools.two_cubes_mesh import write_boxes
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.modal import fenicsx
 from vanedamp.modal.elasticity import Material, assemble
@@ -174,7 +174,7 @@ def test_materials_by_volume_group(tmp_path):
 def test_file_formats(tmp_path, version, binary):
     path = tmp_path / "block.msh"
     with session("convert"):
-        gmsh.merge(str(build(Block(2.0, 1.0, 1.0, divisions=(2, 1, 1)), tmp_path / "source.msh")))
+        gmsh.merge(str(build(TaperedBlock(2.0, 1.0, 1.0, divisions=(2, 1, 1)), tmp_path / "source.msh")))
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", binary)
         gmsh.write(str(path))
@@ -195,7 +195,7 @@ def test_node_numbers_with_gaps(tmp_path):
 
 def test_reading_is_silent(tmp_path):
     """Forms compile in a fresh cache here, with the root logger open."""
-    path = build(Block(1.0, 1.0, 1.0, divisions=(1, 1, 1)), tmp_path / "block.msh")
+    path = build(TaperedBlock(1.0, 1.0, 1.0, divisions=(1, 1, 1)), tmp_path / "block.msh")
     code = (
         "import logging; logging.basicConfig(level=logging.INFO)\n"
         "from vanedamp.modal.elasticity import Material, assemble\n"

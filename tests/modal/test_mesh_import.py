@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid, assemble
 from vanedamp.modal.mesh_import import convert
@@ -17,9 +17,9 @@ meshlane = pytest.importorskip("meshlane")
 STEEL = Material(young=2.1e11, poisson=0.3, density=7800.0)
 SHAPE = {"length": 0.1, "width": 0.02, "thickness": 0.01, "divisions": (6, 2, 1)}
 BLOCKS = {
-    "tetra": Block(**SHAPE),
-    "tetra10": Block(**SHAPE, order=2),
-    "hexahedron": Block(**SHAPE, hexahedra=True),
+    "tetra": TaperedBlock(**SHAPE),
+    "tetra10": TaperedBlock(**SHAPE, order=2),
+    "hexahedron": TaperedBlock(**SHAPE, hexahedra=True),
 }
 GMSH = {"tetra": (4, 4), "tetra10": (11, 10), "hexahedron": (5, 8)}
 CASE = """

@@ -7,7 +7,7 @@ import pytest
 from scipy import sparse
 
 from tests.tools.small_structures import truss
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.correlation import MeasuredShapes, observed_shapes
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticSupport, Material, Solid
@@ -182,7 +182,7 @@ def test_a_search_that_was_stopped_anywhere_resumes_bit_for_bit(system, starts):
 
 def test_a_beam_with_an_elastic_clamp(tmp_path):
     """Finite elements: Young's modulus and the springs of the root from three frequencies, to 0.1 %."""
-    path = build(Block(0.1, 0.02, 0.01, divisions=(6, 1, 1), hexahedra=True), tmp_path / "b.msh")
+    path = build(TaperedBlock(0.1, 0.02, 0.01, divisions=(6, 1, 1), hexahedra=True), tmp_path / "b.msh")
     solid = Solid(path, {"default": STEEL}, elastic={"root": ElasticSupport((5e12, 5e12, 5e12))})
     matrices, parts = solid.assemble({}, 0.0), solid.stiffness_parts()
     true = sum(f * parts[name] for name, f in (("material.block", 0.93), ("support.root", 0.4)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import BLOCK, changed
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.matrices import patch_average
@@ -26,7 +26,7 @@ SQUARE = changed(
 
 @pytest.fixture(scope="module")
 def beam(tmp_path_factory):
-    block = Block(0.1, 0.01, 0.01, divisions=(10, 1, 1), hexahedra=True)
+    block = TaperedBlock(0.1, 0.01, 0.01, divisions=(10, 1, 1), hexahedra=True)
     return assemble(build(block, tmp_path_factory.mktemp("square") / "b.msh"), {"default": STEEL}, {"root": "xyz"})
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, Solid
 from vanedamp.modal.matrices import patch_average
@@ -28,7 +28,9 @@ def test_oscillator_of_two_masses_in_closed_form():
 
 @pytest.fixture(scope="module")
 def solid(tmp_path_factory):
-    path = build(Block(0.5, 0.04, 0.02, divisions=(8, 1, 1), hexahedra=True), tmp_path_factory.mktemp("beam") / "b.msh")
+    path = build(
+        TaperedBlock(0.5, 0.04, 0.02, divisions=(8, 1, 1), hexahedra=True), tmp_path_factory.mktemp("beam") / "b.msh"
+    )
     return Solid(path, {"default": STEEL})
 
 

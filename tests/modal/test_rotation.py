@@ -11,7 +11,7 @@ from tests.reference.finite_strain import frequencies as by_finite_strains
 from tests.tools.arched_cluster import write as write_arched
 from vanedamp.files.store import load
 from vanedamp.files.toml_input import InputError
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal import gyroscopic
 from vanedamp.modal.algebra import cross_matrix
 from vanedamp.modal.eigen import SolverError, solve_modes, static_shape
@@ -38,7 +38,7 @@ FLAP = (3.5160, 3.6816, 4.1373, 4.7973, 5.5850, 6.4495)
 @pytest.fixture(scope="module")
 def beam(tmp_path_factory):
     """A slender beam along x."""
-    block = Block(LENGTH, SIDE, SIDE, divisions=(12, 1, 1), hexahedra=True)
+    block = TaperedBlock(LENGTH, SIDE, SIDE, divisions=(12, 1, 1), hexahedra=True)
     return Solid(build(block, tmp_path_factory.mktemp("beam") / "beam.msh"), BEAM)
 
 
@@ -170,7 +170,7 @@ def test_whirl_of_a_shaft(beam):
 
 def test_gyroscopic_modes_against_the_dense_problem(tmp_path):
     """A stout skew blade: eigenvalues of the whole first-order system, residuals, and the norm of the shapes."""
-    block = Block(0.1, 0.03, 0.02, divisions=(4, 1, 1))
+    block = TaperedBlock(0.1, 0.03, 0.02, divisions=(4, 1, 1))
     solid = Solid(build(block, tmp_path / "blade.msh"), {"default": Material(YOUNG, 0.3, DENSITY)})
     speed = 4500.0
     rotating = solid.rotating(solid.assemble({"root": "xyz"}, 0.0), [1, 2, 1], [0, 0.01, 0], speed=speed)
@@ -414,7 +414,7 @@ def test_slender_blade_that_bends(tmp_path):
     is wrong by 6 % of the first frequency or has it unstable there.
     """
     axis, point, top = np.array([0.0, 1.0, 0.0]), np.array([-0.15, 0.0, 0.0]), 1256.0
-    blade = build(Block(0.15, 0.04, 0.004, divisions=(10, 2, 1)), tmp_path / "blade.msh")
+    blade = build(TaperedBlock(0.15, 0.04, 0.004, divisions=(10, 2, 1)), tmp_path / "blade.msh")
     solid = Solid(blade, {"default": Material(1.14e11, 0.33, 4430.0)})
     standing = solid.assemble({"root": "xyz"}, 0.0)
     rotating = solid.rotating(standing, axis, point, speed=top)
@@ -445,7 +445,7 @@ def test_turned_deformation(arched):
 def test_stout_block_beyond_what_a_metal_bears(tmp_path):
     """About a skew axis beside it."""
     axis, point = np.array([1.0, 2.0, 1.0]), np.array([-0.05, 0.01, 0.0])
-    block = Block(0.1, 0.03, 0.02, divisions=(3, 1, 1))
+    block = TaperedBlock(0.1, 0.03, 0.02, divisions=(3, 1, 1))
     solid = Solid(build(block, tmp_path / "block.msh"), {"default": STEEL})
     standing = solid.assemble({"root": "xyz"}, 0.0)
     for speed in (2000.0, 6000.0):

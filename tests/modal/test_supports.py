@@ -6,19 +6,19 @@ from scipy.sparse.linalg import spsolve
 
 from tests.tools.two_cubes_mesh import write_boxes
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticityError, ElasticSupport, Material, Solid, assemble
 from vanedamp.modal.matrices import patch_average
 
 ROLLERS = {"left": "y", "right": "y", "bottom": "z", "top": "z"}
-TAPERED = Block(0.3, 0.2, 0.1, tip_width=0.1, element_size=0.08)
+TAPERED = TaperedBlock(0.3, 0.2, 0.1, tip_width=0.1, element_size=0.08)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_rod_on_springs(tmp_path, degree):
     """Rod and springs in series under a tip force: F (L / (E A) + 1 / (k A))."""
-    path = build(Block(2.0, 0.5, 0.4, divisions=(2, 1, 1)), tmp_path / "rod.msh")
+    path = build(TaperedBlock(2.0, 0.5, 0.4, divisions=(2, 1, 1)), tmp_path / "rod.msh")
     springs = {"root": ElasticSupport(stiffness=(3.0, 0.0, 0.0))}
     rod = assemble(path, {"default": Material(5.0, 0.3, 1.0)}, ROLLERS, degree, elastic=springs)
     average, free = patch_average(rod, "tip", [1, 0, 0]), rod.free
@@ -38,7 +38,7 @@ def test_rod_on_springs(tmp_path, degree):
     ],
 )
 def test_energy_of_translations_on_a_slanted_face(tmp_path, support, tensor, order):
-    path = build(Block(0.3, 0.2, 0.1, tip_width=0.1, element_size=0.08, order=order), tmp_path / "block.msh")
+    path = build(TaperedBlock(0.3, 0.2, 0.1, tip_width=0.1, element_size=0.08, order=order), tmp_path / "block.msh")
     material = {"default": Material(1e-3, 0.3, 1.0)}
     matrices = assemble(path, material, {}, elastic={"right": support})
     normal = np.array([0.05, 0.3, 0.0]) / np.hypot(0.05, 0.3)
@@ -49,7 +49,7 @@ def test_energy_of_translations_on_a_slanted_face(tmp_path, support, tensor, ord
 
 def test_block_bounces_on_its_bed(tmp_path):
     """A block, stiff against its bed, on rollers: the bounce is at sqrt(k / (density thickness)) / 2 pi."""
-    path = build(Block(1.0, 0.5, 0.2, divisions=(3, 2, 1), hexahedra=True), tmp_path / "block.msh")
+    path = build(TaperedBlock(1.0, 0.5, 0.2, divisions=(3, 2, 1), hexahedra=True), tmp_path / "block.msh")
     held = {"root": "x", "tip": "x", "left": "y", "right": "y"}
     springs = {"bottom": ElasticSupport(stiffness=(0.0, 0.0, 8e6))}
     block = assemble(path, {"default": Material(2e11, 0.3, 8000.0)}, held, elastic=springs)
@@ -58,7 +58,7 @@ def test_block_bounces_on_its_bed(tmp_path):
 
 
 def test_stiff_springs_become_a_clamp_from_below(tmp_path):
-    path = build(Block(0.5, 0.05, 0.05, divisions=(6, 1, 1), hexahedra=True), tmp_path / "beam.msh")
+    path = build(TaperedBlock(0.5, 0.05, 0.05, divisions=(6, 1, 1), hexahedra=True), tmp_path / "beam.msh")
     steel = {"default": Material(2e11, 0.3, 8000.0)}
     clamped = solve_modes(assemble(path, steel, {"root": "xyz"}), 3).frequencies_hz
     missing = []

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.tools.arched_cluster import write as write_arched
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.rotating import UnstableError
@@ -29,7 +29,7 @@ BUCKLING = 4.0 * np.pi**2 * SIDE**2 / (12.0 * LENGTH**2) / EXPANSION
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory):
-    block = Block(LENGTH, SIDE, SIDE, divisions=(16, 1, 1), hexahedra=True)
+    block = TaperedBlock(LENGTH, SIDE, SIDE, divisions=(16, 1, 1), hexahedra=True)
     return build(block, tmp_path_factory.mktemp("beam") / "beam.msh")
 
 

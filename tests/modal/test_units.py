@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.tools.input_files import BLOCK, changed
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.elasticity import ElasticityError, Material, Solid
 from vanedamp.modal.msh import session
 from vanedamp.modal.units import absurdity, doubts, model_doubts, strength_absurdity
@@ -81,7 +81,7 @@ def test_reduced_models():
 def millimetres(tmp_path_factory):
     """The block with its coordinates in millimetres."""
     folder = tmp_path_factory.mktemp("millimetres")
-    path = build(Block(0.1, 0.02, 0.01, divisions=(6, 2, 1)), folder / "block.msh")
+    path = build(TaperedBlock(0.1, 0.02, 0.01, divisions=(6, 2, 1)), folder / "block.msh")
     with session("scale"):
         gmsh.merge(str(path))
         gmsh.model.mesh.affineTransform([1e3, 0, 0, 0, 0, 1e3, 0, 0, 0, 0, 1e3, 0])

@@ -6,7 +6,7 @@ from scipy import integrate
 
 from vanedamp.coupling.scene.contact_laws.compliant import damping_ratio
 from vanedamp.rom import error_estimate as ladder
-from vanedamp.rom.contact_pulse import Collision, pulse, pulse_spectrum, share_above
+from vanedamp.rom.contact_pulse import WallContact, pulse, pulse_spectrum, share_above
 from vanedamp.rom.reduced import ReducedModel
 
 
@@ -25,7 +25,7 @@ def test_pulse_of_a_free_wall(restitution):
     mass, wall, spring = 0.5, 2.0, 3.0
     reduced = mass * wall / (mass + wall)
     dashpot = 2 * damping_ratio(restitution) * np.sqrt(spring * reduced)
-    found = pulse(np.full(1, 1e-8), np.array([1 / np.sqrt(wall)]), Collision("wall", mass, spring, dashpot), 1e-9)
+    found = pulse(np.full(1, 1e-8), np.array([1 / np.sqrt(wall)]), WallContact("wall", mass, spring, dashpot), 1e-9)
     assert found.transform == pytest.approx((1 + restitution) * reduced, rel=1e-6)
     if restitution == 1.0:
         assert found.duration == pytest.approx(np.pi * np.sqrt(reduced / spring), rel=1e-7)
@@ -49,7 +49,7 @@ def test_pulse_with_modes_against_integration():
         rate, (0, 10), start, rtol=1e-11, atol=1e-13, events=ended, dense_output=True, method="DOP853"
     )
     end = run.t_events[0][0]
-    found = pulse(squares, row, Collision("wall", mass, spring, dashpot), frequency)
+    found = pulse(squares, row, WallContact("wall", mass, spring, dashpot), frequency)
     assert found.duration == pytest.approx(end, rel=1e-8)
     parts = [
         integrate.quad(lambda t, f=f: ended(t, run.sol(t)) * f(2 * np.pi * frequency * t), 0, end, limit=200)[0]
@@ -60,12 +60,12 @@ def test_pulse_with_modes_against_integration():
 
 def test_share_above_of_two_modes():
     # the second mode is far below the contact's frequency and takes its part of a blow at once
-    squares, row, collision = np.array([1.0, 25.0]), np.array([1.0, 0.5]), Collision("wall", 0.5, 1e8)
+    squares, row, collision = np.array([1.0, 25.0]), np.array([1.0, 0.5]), WallContact("wall", 0.5, 1e8)
     # reduced mass 1/(1 + 2), impulse 2/3: energy (0.5 * 2/3)^2 / 2 besides an approach with 1/6
     assert share_above(squares, row, 1, collision) == pytest.approx((1 / 18) / (1 / 6 + 1 / 18), rel=1e-4)
     assert share_above(squares, row, 2, collision) == 0.0
     # and one far above hardly moves
-    assert share_above(np.array([1.0, 1e12]), row, 1, Collision("wall", 0.5, 1e4)) < 1e-12
+    assert share_above(np.array([1.0, 1e12]), row, 1, WallContact("wall", 0.5, 1e4)) < 1e-12
 
 
 def test_ladder_knows_what_pulses_lack():
@@ -75,7 +75,7 @@ def test_ladder_knows_what_pulses_lack():
 
     def collisions(smaller, yields):
         lost = smaller.residual_flexibility[0, 0] if yields else 0.0
-        return [Collision("wall", 0.2, 1 / (1e-3 + lost))]
+        return [WallContact("wall", 0.2, 1 / (1e-3 + lost))]
 
     hard = [ladder.natural_ladder(model, np.array([0.1]), collisions=lambda m, y=y: collisions(m, y)) for y in (0, 1)]
     assert [rung.modes for rung in hard[0]] == [1, 2, 3]

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 
 from tests.tools.small_structures import truss, turned
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.rom.interface import Interface, InterfaceCoordinate, InterfaceError, outward_normal, plane_motion
 from vanedamp.rom.reduction import reduce
@@ -24,7 +24,9 @@ FACES = ("left", "right", "bottom", "top")
 def block(request, tmp_path_factory):
     """A block whose faces are those of a cavity, with y along it and z across it."""
     size = None if request.param == "structured" else 0.3
-    path = build(Block(1.0, 0.8, 0.6, divisions=(3, 2, 2), element_size=size), tmp_path_factory.mktemp("b") / "b.msh")
+    path = build(
+        TaperedBlock(1.0, 0.8, 0.6, divisions=(3, 2, 2), element_size=size), tmp_path_factory.mktemp("b") / "b.msh"
+    )
     matrices = assemble(path, STEEL, {"root": "xyz"})
     return turned(matrices, INCLINED) if request.param == "inclined" else matrices
 
@@ -96,7 +98,7 @@ def test_patches_taken_as_one():
 def beam(tmp_path_factory):
     """A slender beam along x, bent along z."""
     length, width, height = 1.0, 0.04, 0.04
-    shape = Block(length, width, height, divisions=(24, 1, 1), hexahedra=True)
+    shape = TaperedBlock(length, width, height, divisions=(24, 1, 1), hexahedra=True)
     return assemble(build(shape, tmp_path_factory.mktemp("beam") / "beam.msh"), STEEL, {"root": "xyz"})
 
 

@@ -11,7 +11,7 @@ from tests.tools.reduction_errors import frequency_errors, full_receptance, stat
 from vanedamp import Scene, simulate
 from vanedamp.coupling.output_histories import histories
 from vanedamp.files.toml_input import InputError, validate
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import factorize, solve_modes, static_shape
 from vanedamp.modal.elasticity import Material, Solid
 from vanedamp.modal.rotating import UnstableError
@@ -32,7 +32,7 @@ FAST = 3.0
 @pytest.fixture(scope="module")
 def rotating(tmp_path_factory):
     """A clamped plate whose axis lies across it, oblique to its plane."""
-    block = Block(0.2, 0.05, 0.006, divisions=(8, 2, 1), hexahedra=True)
+    block = TaperedBlock(0.2, 0.05, 0.006, divisions=(8, 2, 1), hexahedra=True)
     solid = Solid(
         build(block, tmp_path_factory.mktemp("plate") / "plate.msh"), {"default": Material(2e11, 0.3, 8000.0)}
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy import linalg, sparse
 
-from vanedamp.modal.cyclic import CyclicSector, Spring, cyclic_sector
+from vanedamp.modal.cyclic import CyclicSector, SectorSpring, cyclic_sector
 from vanedamp.modal.matrices import Patch, SystemMatrices
 from vanedamp.rom.ring.deviations import Deviations
 from vanedamp.rom.ring.ring_model import RingModel
@@ -115,7 +115,7 @@ class LumpedDisk:
     def sector(self) -> CyclicSector:
         """Return the cyclic sector about the axis z."""
         if self.springs:
-            springs = (Spring("low", "high", (self.springs, 0.5 * self.springs, 2.0 * self.springs)),)
+            springs = (SectorSpring("low", "high", (self.springs, 0.5 * self.springs, 2.0 * self.springs)),)
             return cyclic_sector(self.matrices(), None, None, self.sectors, couplings=springs)
         return cyclic_sector(self.matrices(), "low", "high", self.sectors)
 

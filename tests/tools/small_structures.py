@@ -10,10 +10,10 @@ from vanedamp.modal.matrices import Patch, SystemMatrices
 
 def blade(folder, divisions):
     """A plate of solid elements, clamped at the root, thin along z. folder: where its mesh is written."""
-    from vanedamp.meshes.benchmarks import Block, build
+    from vanedamp.meshes.benchmarks import TaperedBlock, build
     from vanedamp.modal.elasticity import Material, assemble
 
-    path = build(Block(0.2, 0.08, 0.01, divisions=divisions, hexahedra=True), folder / "blade.msh")
+    path = build(TaperedBlock(0.2, 0.08, 0.01, divisions=divisions, hexahedra=True), folder / "blade.msh")
     return assemble(path, {"default": Material(young=2.0e11, poisson=0.3, density=8190.0)}, {"root": "xyz"}, degree=2)
 
 

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from tests.validation.page import Case, Figure, case
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.msh import session
@@ -30,7 +30,7 @@ def membrane(folder: Path, cells: int, width: float, tip_width: float | None = N
     The lower half of the thickness with the middle plane on rollers: no bending, free to thin, so plane stress.
     """
     across = round(cells * width / 10.0)
-    block = Block(10.0, width, 0.025, tip_width, divisions=(cells, across, 1), hexahedra=True)
+    block = TaperedBlock(10.0, width, 0.025, tip_width, divisions=(cells, across, 1), hexahedra=True)
     path = build(block, folder / "membrane.msh")
     return solve_modes(assemble(path, {"default": STEEL}, {"root": "xyz", "bottom": "z"}, degree=2), 6).frequencies_hz
 
@@ -48,7 +48,7 @@ def tapered_membrane(folder: Path, cells: int) -> np.ndarray:
 def square_plate(folder: Path, cells: int) -> np.ndarray:
     """SDLS01: lambda^2 of a plate of 1 m, 0.01 m thick, clamped on one edge, from its frequencies by thin plates."""
     side, thickness, young, density = 1.0, 0.01, 2.1e11, 7800.0
-    block = Block(side, side, thickness, divisions=(cells, cells, 1), hexahedra=True)
+    block = TaperedBlock(side, side, thickness, divisions=(cells, cells, 1), hexahedra=True)
     path, steel = build(block, folder / "plate.msh"), {"default": Material(young, 0.3, density)}
     frequencies = solve_modes(assemble(path, steel, {"root": "xyz"}, degree=2), 6).frequencies_hz
     return frequencies * 2 * np.pi * side**2 / np.sqrt(young * thickness**2 / (12 * density * (1 - 0.3**2)))

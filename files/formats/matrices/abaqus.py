@@ -1,7 +1,7 @@
 """Matrices of Abaqus: substructures (*USER ELEMENT with *MATRIX) in and out, global ones (*MATRIX OUTPUT) in.
 
 A substructure's file, as *SUBSTRUCTURE MATRIX OUTPUT and CalculiX write it, is the definition of a linear user element:
-the columns of a symmetric matrix from the first row to the diagonal, four entries a line, one column after the other.
+the columns of a symmetric matrix from the first row to the diagonal, four entries per line, one column after another.
 """
 
 from __future__ import annotations
@@ -76,10 +76,10 @@ def read_matrices(path: Path) -> dict[str, Any]:
             "of row, column, entry"
         )
     table = np.array(rows)
-    places = table[:, :-1]
-    if np.any(places != np.round(places)):
+    indices = table[:, :-1]
+    if np.any(indices != np.round(indices)):
         raise MatrixFileError("nodes, freedoms, rows and columns are whole numbers")
-    return {"": _global(places.astype(int), table[:, -1])}
+    return {"": _global(indices.astype(int), table[:, -1])}
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
@@ -136,10 +136,10 @@ def _unpacked(name: str, entries: np.ndarray, whole: bool) -> np.ndarray:
     return np.asarray(matrix + np.tril(matrix, -1).T)
 
 
-def _global(places: np.ndarray, values: np.ndarray) -> GlobalMatrix:
+def _global(indices: np.ndarray, values: np.ndarray) -> GlobalMatrix:
     freedoms = None
-    if places.shape[1] == 4:
-        freedoms, index = np.unique(places.reshape(-1, 2), axis=0, return_inverse=True)
+    if indices.shape[1] == 4:
+        freedoms, index = np.unique(indices.reshape(-1, 2), axis=0, return_inverse=True)
         nodes, kinds = (len(np.unique(freedoms[:, column])) for column in (0, 1))
         if len(freedoms) != nodes * kinds:
             raise MatrixFileError(
@@ -148,9 +148,9 @@ def _global(places: np.ndarray, values: np.ndarray) -> GlobalMatrix:
             )
         rows, columns = index.reshape(-1, 2).T
     else:
-        if places.min() < 1:
+        if indices.min() < 1:
             raise MatrixFileError("rows and columns count from 1")
-        rows, columns = places.T - 1
+        rows, columns = indices.T - 1
     size = int(max(rows.max(), columns.max())) + 1
     # lists of entries may hold one twice, of which the last counts
     last = len(rows) - 1 - np.unique((rows * size + columns)[::-1], return_index=True)[1]

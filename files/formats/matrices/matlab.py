@@ -20,10 +20,10 @@ def read_mat(path: str | Path) -> dict[str, Any]:
     Versions 4 to 7 are read by scipy, 7.3 (HDF5) here. Structures, cells and texts are left out. Raises what the
     libraries raise for a damaged file.
     """
-    found = apart(path, MatrixFileError, lambda: _matlab(path))
+    content = apart(path, MatrixFileError, lambda: _matlab(path))
     return {
         name: within_shape(matrix)
-        for name, matrix in found.items()
+        for name, matrix in content.items()
         if not name.startswith("__") and (sparse.issparse(matrix) or _numeric(matrix))
     }
 
@@ -44,11 +44,11 @@ def _variable(item: h5py.Dataset | h5py.Group) -> Any:
         if "MATLAB_sparse" not in item.attrs:
             return None
         columns, rows = item["jc"][()].astype(int), int(item.attrs["MATLAB_sparse"])
-        empty = "data" not in item  # MATLAB leaves out what is empty
-        data, places = (
+        empty = "data" not in item  # MATLAB omits empty arrays
+        data, indices = (
             (np.empty(0), np.empty(0, int)) if empty else (_complex(item["data"]), item["ir"][()].astype(int))
         )
-        return sparse.csc_array((data, places, columns), shape=(rows, len(columns) - 1))
+        return sparse.csc_array((data, indices, columns), shape=(rows, len(columns) - 1))
     if item.attrs.get("MATLAB_class", b"double") in (b"char", b"cell", b"struct") or "MATLAB_empty" in item.attrs:
         return None
     return _complex(item).T

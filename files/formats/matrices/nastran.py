@@ -28,11 +28,11 @@ def read_op2(path: str) -> dict[str, Any]:
     """Return the matrices of an OUTPUT2 file by name: its own, or from its DMIG entries."""
     nastran = _nastran(path)
     with nastran.op2.OP2(path) as file:
-        found = dict(file.rdop2mats())
-    found = found or _assembled(nastran.rddmig(path))
-    if not found:
+        matrices = dict(file.rdop2mats())
+    matrices = matrices or _assembled(nastran.rddmig(path))
+    if not matrices:
         raise MatrixFileError(f"{path}: holds no matrices; OUTPUT2 of DMAP or EXTSEOUT(DMIGOP2) of Nastran write them")
-    return found
+    return matrices
 
 
 def read_dmig(path: str) -> dict[str, Any]:
@@ -43,18 +43,20 @@ def read_dmig(path: str) -> dict[str, Any]:
     return _assembled(_nastran(path).rddmig(path))
 
 
-def _assembled(found: Mapping[str, Any]) -> dict[str, Any]:
+def _assembled(frames: Mapping[str, Any]) -> dict[str, Any]:
     """Return the matrices of DMIG entries (pandas.DataFrame), square ones over the freedoms of any of them."""
-    square = {name: frame for name, frame in found.items() if frame.columns.nlevels == 2}
+    square = {name: frame for name, frame in frames.items() if frame.columns.nlevels == 2}
     freedoms = sorted(
-        {place for frame in found.values() for place in frame.index}
-        | {place for frame in square.values() for place in frame.columns}
+        {freedom for frame in frames.values() for freedom in frame.index}
+        | {freedom for frame in square.values() for freedom in frame.columns}
     )
-    places = {place: index for index, place in enumerate(freedoms)}
+    index_of = {freedom: index for index, freedom in enumerate(freedoms)}
     matrices = {}
-    for name, frame in found.items():
-        rows = [places[place] for place in frame.index]
-        columns = [places[place] for place in frame.columns] if name in square else [int(c) - 1 for c in frame.columns]
+    for name, frame in frames.items():
+        rows = [index_of[freedom] for freedom in frame.index]
+        columns = (
+            [index_of[freedom] for freedom in frame.columns] if name in square else [int(c) - 1 for c in frame.columns]
+        )
         matrix = np.zeros(
             (len(freedoms), len(freedoms) if name in square else max(columns) + 1), frame.to_numpy().dtype
         )

@@ -1,4 +1,4 @@
-"""Which reader takes a matrix file: by its ending."""
+"""Readers of matrix files, by their endings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from vanedamp.files.sparse_indices import within_shape
 
 
 def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Read the dense matrices of a file by lower-case name; where those clash, by their own names.
+    """Read the dense matrices of a file by lower-case name; where these clash, by their own names.
 
     That in .mtx, .npy, .csv, CalculiX's .sti and .mas or scipy's save_npz is "". Several hold .npz, MATLAB's .mat,
     Nastran's OP4, OP2 and DMIG entries (.pch, .dmig), of which all have the same rows, by grid point and component, and
@@ -39,14 +39,14 @@ def read_matrices(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             warnings.filterwarnings("error", "Premature end-of-file")  # so pyyeti calls a file that is cut short
-            found = _READERS[file.suffix.lower()](str(file))
+            matrices = _READERS[file.suffix.lower()](str(file))
     except MemoryError:
         raise
     except VanedampError as error:
         raise MatrixFileError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from error
     except Exception as error:  # every format has exceptions of its own
         raise MatrixFileError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
-    dense = {name: np.asarray(_dense(matrix)) for name, matrix in found.items()}
+    dense = {name: np.asarray(_dense(matrix)) for name, matrix in matrices.items()}
     dense = {name: matrix for name, matrix in dense.items() if matrix.dtype.kind in "biufc"}
     counts = Counter(name.lower() for name in dense)
     return {name if counts[name.lower()] > 1 else name.lower(): matrix for name, matrix in dense.items()}
@@ -59,7 +59,7 @@ def row_freedoms(path: str | os.PathLike[str]) -> np.ndarray | None:
 
 
 def read_npz(path: str | os.PathLike[str]) -> Any:
-    """Return the matrix of scipy.sparse.save_npz. Raises what the libraries raise for a damaged file."""
+    """Return the matrix of scipy.sparse.save_npz. Raises the libraries' errors for a damaged file."""
     return within_shape(sparse.load_npz(path))
 
 

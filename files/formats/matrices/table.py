@@ -11,7 +11,7 @@ from vanedamp.files.formats.matrices import MatrixFileError
 
 
 def read_table(path: str | Path) -> np.ndarray:
-    """Return the dense matrix (n, m) of a CSV file, one row a line.
+    """Return the dense matrix (n, m) of a CSV file, one row per line.
 
     Columns stand between `;`, `,`, tabs or blanks; with `;`, a comma in a number is its decimal point. A first line of
     names and a first column of names are left out, and lines that begin with # or %. Raises MatrixFileError with the

@@ -1,12 +1,11 @@
 """Decks of Abaqus and CalculiX (.inp): nodes in global coordinates, elements and sets.
 
-Every keyword that gives or moves nodes and elements is followed or rejected. Others say nothing about the mesh: their
-meaning for the structure (materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads, steps)
-is said in the case, in global axes.
+Every keyword that defines or moves nodes and elements is followed or rejected. Others do not change the mesh: the case
+defines materials and their *ORIENTATION, supports and the *TRANSFORM of their axes, loads and steps, in global axes.
 
-Why not meshlane: of the tests' 24 decks that must be rejected version 5.5.0 reads 17 as meshes, and of 18 sound ones it
-reads 5 with the same nodes, elements and sets: it knows no *SYSTEM, moves no instance, and skips six- and eight-node
-shells (CPS6, CPS8). meshio 5.3.5 reads 14 and 5.
+Why not meshlane: version 5.5.0 reads 17 of the tests' 24 decks that must be rejected, and reads 5 of 18 sound ones with
+the same nodes, elements and sets: it lacks *SYSTEM, moves no instance, and skips six- and eight-node shells (CPS6,
+CPS8). meshio 5.3.5 reads 14 and 5.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from vanedamp.files.formats.meshes.frames import Frame, rotation, through
+from vanedamp.files.formats.meshes.frames import CoordinateSystem, rotation, through
 from vanedamp.files.formats.meshes.labelled_mesh import (
     KINDS,
     LINES,
@@ -61,7 +60,7 @@ _REFUSED = {
 _SECTIONS = ("SHELL SECTION", "SHELL GENERAL SECTION", "MEMBRANE SECTION", "SOLID SECTION", "SURFACE SECTION")
 
 
-class _Card(NamedTuple):
+class _Keyword(NamedTuple):
     """A keyword line with its data: (line, words)."""
 
     head: DeckLine
@@ -91,13 +90,13 @@ class _Deck:
     """
 
     mesh: LabelledMesh = field(default_factory=LabelledMesh)
-    opened: list[_Card] = field(default_factory=list)
+    opened: list[_Keyword] = field(default_factory=list)
     meshed: str | None = None
     instance: str = ""
     of_part: dict[int, set[str]] = field(default_factory=dict)
-    frame: Frame = field(default_factory=Frame)
+    frame: CoordinateSystem = field(default_factory=CoordinateSystem)
 
-    def read(self, card: _Card) -> None:
+    def read(self, card: _Keyword) -> None:
         """Take in one keyword with its data."""
         keyword = card.keyword
         card.head.refuse(f"*{keyword}", _REFUSED)
@@ -106,9 +105,9 @@ class _Deck:
             self.of_part = {id(sets): set(sets) for sets in self._kinds()}
         if begun in _SCOPES:
             self.opened.append(card)
-            self.frame = Frame()
+            self.frame = CoordinateSystem()
         elif ended in _SCOPES:
-            self.frame = Frame()
+            self.frame = CoordinateSystem()
             if not self.opened or self.opened.pop().keyword != ended:
                 raise card.head.error(f"closes no *{ended}")
         if keyword in ("NODE", "ELEMENT"):
@@ -129,7 +128,7 @@ class _Deck:
     def _kinds(self) -> tuple[dict[str, Any], ...]:
         return self.mesh.node_sets, self.mesh.element_sets, self.mesh.face_sets
 
-    def _given(self, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
+    def _set_of(self, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
         """Return the members so far of a set that is being given.
 
         One of the assembly hides the part's of its name, which the assembly knows as <instance>.<name>.
@@ -144,35 +143,35 @@ class _Deck:
 
     def _add(self, sets: dict[str, list[int]], name: str | None, labels: list[int]) -> None:
         if name:
-            self._given(sets, name).extend(labels)
+            self._set_of(sets, name).extend(labels)
 
-    def _section(self, card: _Card) -> None:
+    def _section(self, card: _Keyword) -> None:
         """Note the shells and trusses to which a section gives a stiffness."""
         named, mesh = card.parameters.get("ELSET"), self.mesh
         if named is None or (card.keyword == "SURFACE SECTION" and "DENSITY" not in card.parameters):
             return
         if card.keyword == "SOLID SECTION" and _spelling(mesh.element_sets, named) not in mesh.element_sets:
             return
-        for label in _known(card.head, mesh.element_sets, named):
+        for label in _set_members(card.head, mesh.element_sets, named):
             if KINDS[mesh.elements[label][0]][0] < 3:
                 mesh.stiff[label] = f"*{card.keyword} in line {card.head.number}"
 
-    def _check_scope(self, card: _Card) -> None:
+    def _check_scope(self, card: _Keyword) -> None:
         """Reject a second part: labels are unique within one part only."""
         scope = self.opened[-1].keyword if self.opened else ""
         if self.meshed not in (None, scope):
             raise card.head.error("of a second part, or of the assembly; write one part with all of the mesh")
         self.meshed = scope
 
-    def _part(self, card: _Card) -> None:
+    def _part(self, card: _Keyword) -> None:
         if self.mesh.nodes:
             raise card.head.error("after the first one with nodes; write one part with all of the mesh")
 
-    def _node(self, card: _Card) -> None:
+    def _node(self, card: _Keyword) -> None:
         kind = card.parameters.get("SYSTEM", "R").upper()[:1]
         if kind not in ("R", "C"):
             raise card.head.error(f"SYSTEM={kind}: expected R or C; write rectangular or cylindrical coordinates")
-        frame = Frame(kind="cylindrical") if kind == "C" else Frame()
+        frame = CoordinateSystem(kind="cylindrical") if kind == "C" else CoordinateSystem()
         labels, points = [], []
         for line, row in card.numbers():
             if len(row) < 2 or not np.all(np.isfinite(row[:4])):
@@ -181,21 +180,21 @@ class _Deck:
             points.append([*row[1:4], 0.0, 0.0][:3])
         if not labels:
             return
-        places = self.frame.to_global(frame.to_global(np.array(points)))
-        for (line, _), label, place in zip(card.data, labels, places, strict=True):
-            self.mesh.add_node(line, label, place)
+        points_global = self.frame.to_global(frame.to_global(np.array(points)))
+        for (line, _), label, point in zip(card.data, labels, points_global, strict=True):
+            self.mesh.add_node(line, label, point)
         self._add(self.mesh.node_sets, card.parameters.get("NSET"), labels)
 
-    def _element(self, card: _Card) -> None:
-        given = card.parameters.get("TYPE", "").upper()
-        matches = ((pattern.fullmatch(given), kinds) for pattern, kinds in _ELEMENTS)
+    def _element(self, card: _Keyword) -> None:
+        name = card.parameters.get("TYPE", "").upper()
+        matches = ((pattern.fullmatch(name), kinds) for pattern, kinds in _ELEMENTS)
         kind = next((kinds[int(m[1])] for m, kinds in matches if m and int(m[1]) in kinds), "")
         if not kind:
-            raise card.head.error(f"TYPE={given}: expected solids (C3D4, C3D10, C3D8, C3D20), or shells as their skin")
-        width = next(nodes for nodes, own in [*SOLIDS.items(), *SHELLS.items(), *LINES.items()] if own == kind)
+            raise card.head.error(f"TYPE={name}: expected solids (C3D4, C3D10, C3D8, C3D20), or shells as their skin")
+        width = next(nodes for nodes, shape in [*SOLIDS.items(), *SHELLS.items(), *LINES.items()] if shape == kind)
         words = [(line, word) for line, row in card.data for word in row if word]
         if len(words) % (width + 1):
-            raise card.head.error(f"TYPE={given}: expected a label and {width} nodes an element")
+            raise card.head.error(f"TYPE={name}: expected a label and {width} nodes an element")
         labels = []
         for start in range(0, len(words), width + 1):
             line = words[start][0]
@@ -207,19 +206,21 @@ class _Deck:
             labels.append(label)
         self._add(self.mesh.element_sets, card.parameters.get("ELSET"), labels)
 
-    def _node_set(self, card: _Card) -> None:
+    def _node_set(self, card: _Keyword) -> None:
         mesh, named = self.mesh, card.parameters.get("ELSET")
         if named is None:
             labels = self._members(card, mesh.nodes, mesh.node_sets)
         else:
-            labels = [node for label in _known(card.head, mesh.element_sets, named) for node in mesh.elements[label][1]]
+            labels = [
+                node for label in _set_members(card.head, mesh.element_sets, named) for node in mesh.elements[label][1]
+            ]
         self._add(mesh.node_sets, card.parameters.get("NSET"), labels)
 
-    def _element_set(self, card: _Card) -> None:
+    def _element_set(self, card: _Keyword) -> None:
         members = self._members(card, self.mesh.elements, self.mesh.element_sets)
         self._add(self.mesh.element_sets, card.parameters.get("ELSET"), members)
 
-    def _surface(self, card: _Card) -> None:
+    def _surface(self, card: _Keyword) -> None:
         """Take in faces of elements, by their numbers or all that are free; or the nodes of a node-based surface."""
         mesh, name, kind = self.mesh, card.parameters.get("NAME"), card.parameters.get("TYPE", "ELEMENT").upper()
         if not name or kind not in ("ELEMENT", "NODE"):
@@ -229,25 +230,27 @@ class _Deck:
         if kind == "NODE":
             first = [(line, words[:1]) for line, words in card.data]
             labels = self._members(card._replace(data=first), mesh.nodes, mesh.node_sets)
-            given = self._given(mesh.node_sets, name)
-            if given and set(given) != set(labels):
+            node_set = self._set_of(mesh.node_sets, name)
+            if node_set and set(node_set) != set(labels):
                 raise card.head.error(f"NAME={name}: a set of other nodes has this name; give it another")
-            given.extend(labels)
+            node_set.extend(labels)
             return
-        own = self._given(mesh.face_sets, name)
+        faces = self._set_of(mesh.face_sets, name)
         for line, words in card.data:
             if "COMBINE" in card.parameters:
-                own.extend(face for other in filter(None, words) for face in _known(line, mesh.face_sets, other))
+                faces.extend(
+                    face for surface in filter(None, words) for face in _set_members(line, mesh.face_sets, surface)
+                )
                 continue
-            one = card._replace(data=[(line, words[:1])])
-            members = self._members(one, mesh.elements, mesh.element_sets) if words[0] else list(mesh.elements)
+            single = card._replace(data=[(line, words[:1])])
+            members = self._members(single, mesh.elements, mesh.element_sets) if words[0] else list(mesh.elements)
             face = words[1].upper() if len(words) > 1 else ""
-            own.extend([self._face(one, label, face) for label in members] if face else self._free(set(members)))
+            faces.extend([self._face(single, label, face) for label in members] if face else self._free(set(members)))
 
-    def _face(self, card: _Card, label: int, face: str) -> tuple[int, ...]:
+    def _face(self, card: _Keyword, label: int, face: str) -> tuple[int, ...]:
         """Return the corners of a face of an element: S1, S2 ... of a solid, SPOS or SNEG of a shell."""
         kind, nodes = self.mesh.elements[label]
-        faces = {f"S{number}": places for number, places in enumerate(_FACES.get(kind, []), 1)}
+        faces = {f"S{number}": corners for number, corners in enumerate(_FACES.get(kind, []), 1)}
         if kind in SHELLS.values():
             faces = dict.fromkeys(("SPOS", "SNEG"), tuple(range(KINDS[kind][1])))
         if face not in faces:
@@ -255,7 +258,7 @@ class _Deck:
                 f"NAME={card.parameters['NAME']}: element {label} ({kind}) has no face {face}; it has "
                 f"{', '.join(faces) or 'none'}"
             )
-        return tuple(nodes[place] for place in faces[face])
+        return tuple(nodes[corner] for corner in faces[face])
 
     def _free(self, members: set[int]) -> Iterator[tuple[int, ...]]:
         """Yield the faces of these elements that no other element has."""
@@ -267,7 +270,7 @@ class _Deck:
         counts = Counter(tuple(sorted(face)) for _, face in faces)
         yield from (face for label, face in faces if label in members and counts[tuple(sorted(face))] == 1)
 
-    def _members(self, card: _Card, known: dict[int, Any], sets: dict[str, list[int]]) -> list[int]:
+    def _members(self, card: _Keyword, entities: dict[int, Any], sets: dict[str, list[int]]) -> list[int]:
         labels: list[int] = []
         for line, words in card.data:
             if "GENERATE" in card.parameters:
@@ -282,15 +285,15 @@ class _Deck:
                 if plain.isdecimal():
                     labels.append(int(plain))
                 elif plain:
-                    labels.extend(_known(line, sets, word))
+                    labels.extend(_set_members(line, sets, word))
         for label in labels:
-            if label not in known and "GENERATE" not in card.parameters:
+            if label not in entities and "GENERATE" not in card.parameters:
                 raise card.head.error(f"names {label}, which is not given before it")
-        return [label for label in labels if label in known]
+        return [label for label in labels if label in entities]
 
-    def _system(self, card: _Card) -> None:
+    def _system(self, card: _Keyword) -> None:
         values = [value for _, row in card.numbers()[:2] for value in (row + [0.0] * 6)[: 6 if len(row) > 3 else 3]]
-        self.frame = Frame()
+        self.frame = CoordinateSystem()
         if not values:
             return
         origin = np.array(values[:3])
@@ -303,9 +306,9 @@ class _Deck:
                 axes = through(np.array(values[3:6]) - origin, np.array(values[6:9]) - origin)
         except ValueError as error:
             raise card.head.error(f"gives no axes: {error}") from error
-        self.frame = Frame(origin, axes)
+        self.frame = CoordinateSystem(origin, axes)
 
-    def _instance(self, card: _Card) -> None:
+    def _instance(self, card: _Keyword) -> None:
         if self.instance:
             raise card.head.error("is the second one; write one part with all of the mesh, in global coordinates")
         self.instance = card.parameters.get("NAME", "instance")
@@ -314,16 +317,16 @@ class _Deck:
             return
         if not self.mesh.nodes:
             raise card.head.error("moves nodes of its own; write them in global coordinates")
-        places = np.array(list(self.mesh.nodes.values())) + (rows[0] + [0.0] * 3)[:3]
+        points = np.array(list(self.mesh.nodes.values())) + (rows[0] + [0.0] * 3)[:3]
         if len(rows) > 1:
             if len(rows[1]) != 7:
                 raise card.head.error("expected two points of the axis and an angle in its second line")
             start, end = np.array(rows[1][:3]), np.array(rows[1][3:6])
             try:
-                places = start + (places - start) @ rotation(end - start, rows[1][6]).T
+                points = start + (points - start) @ rotation(end - start, rows[1][6]).T
             except ValueError as error:
                 raise card.head.error(f"gives no rotation: {error}") from error
-        self.mesh.nodes = dict(zip(self.mesh.nodes, places, strict=True))
+        self.mesh.nodes = dict(zip(self.mesh.nodes, points, strict=True))
 
 
 def read(path: Path) -> LabelledMesh:
@@ -337,27 +340,27 @@ def read(path: Path) -> LabelledMesh:
 
 def _spelling(sets: Mapping[str, object], name: str) -> str:
     """Return the name as it was first written: Abaqus ignores case."""
-    return next((known for known in sets if known.upper() == name.upper()), name)
+    return next((spelled for spelled in sets if spelled.upper() == name.upper()), name)
 
 
-def _known(line: DeckLine, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
+def _set_members(line: DeckLine, sets: dict[str, list[_Member]], name: str) -> list[_Member]:
     """Return the members of a set. Raises MeshError for a set that no line before has given."""
     plain = name.rpartition(".")[2]  # without the name of an instance
-    own = next((spelled for spelled in (_spelling(sets, name), _spelling(sets, plain)) if spelled in sets), None)
-    if own is None:
+    key = next((spelled for spelled in (_spelling(sets, name), _spelling(sets, plain)) if spelled in sets), None)
+    if key is None:
         raise line.error(f"names the set {plain!r}, which is not given before it")
-    return sets[own]
+    return sets[key]
 
 
-def _cards(path: Path) -> Iterator[_Card]:
+def _cards(path: Path) -> Iterator[_Keyword]:
     """Yield the keywords of a deck with their data."""
-    card: _Card | None = None
+    card: _Keyword | None = None
     for line in lines(path):
         if line.text.startswith("*"):
             if card is not None:
                 yield card
             keyword, parameters = _keyword(line.text)
-            card = _Card(line._replace(within=f"*{keyword} "), keyword, parameters, [])
+            card = _Keyword(line._replace(within=f"*{keyword} "), keyword, parameters, [])
         elif card is None:
             raise line.error("a row before the first keyword; is this a deck of Abaqus?")
         else:
@@ -372,23 +375,23 @@ def lines(path: Path, including: tuple[Path, ...] = ()) -> Iterator[DeckLine]:
     including: the files that include this one. Raises MeshError with file and line.
     """
     including = (*including, path.resolve())
-    own_lines = iter(deck_lines(path))
-    for line in own_lines:
+    file_lines = iter(deck_lines(path))
+    for line in file_lines:
         text = line.text.strip()
         if not text or text.startswith("**"):
             continue
         while text.startswith("*") and text.endswith(","):
-            more = next(own_lines, None)
+            more = next(file_lines, None)
             text += (more.text.strip() if more else "") or "*"
         keyword, parameters = _keyword(text)
-        name, own = parameters.get("INPUT"), line._replace(text=text)
+        name, keyword_line = parameters.get("INPUT"), line._replace(text=text)
         if keyword != "INCLUDE":
-            yield own
+            yield keyword_line
         elif name is None:
-            raise own.error("*INCLUDE without INPUT; name the file")
+            raise keyword_line.error("*INCLUDE without INPUT; name the file")
         if name is None or keyword not in ("INCLUDE", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"):
             continue
-        file = own._replace(within=f"*{keyword} INPUT=").named_file(name, including)
+        file = keyword_line._replace(within=f"*{keyword} INPUT=").named_file(name, including)
         for inner in lines(file, including):
             if keyword != "INCLUDE" and inner.text.startswith("*"):
                 raise inner.error(f"a keyword among the data of *{keyword}; name the file by *INCLUDE")

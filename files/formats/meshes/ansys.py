@@ -1,6 +1,6 @@
 """Ansys archives (.cdb, written by CDWRITE): nodes, elements and components.
 
-Read are the blocks NBLOCK, EBLOCK and CMBLOCK and the types of elements (ET, ETBLOCK). Source: Ansys Mechanical APDL,
+Reads the blocks NBLOCK, EBLOCK and CMBLOCK and the types of elements (ET, ETBLOCK). Source: Ansys Mechanical APDL,
 guide to interfacing, coded database file commands; element reference for the nodes of degenerate shapes.
 
 Why not mapdl-archive: version 0.4.2 reads a file that is cut within its elements as a mesh of 86 in place of 298,
@@ -22,11 +22,11 @@ from vanedamp.files.formats.meshes.labelled_mesh import SHELLS, SOLIDS, DeckLine
 _SOLIDS = {5, 45, 62, 64, 65, 70, 72, 73, 87, 90, 92, 95, 96, 98}
 _SOLIDS |= {162, 164, 168, 185, 186, 187, 190, 226, 227, 278, 279, 285}
 _SKINS = (25, 28, 41, 42, 43, 63, 77, 82, 91, 93, 99, 131, 132, 151, 152, 153, 154, 157, 181, 182, 183, 200, 223, 281)
-# those that carry loads or temperatures only
+# elements that carry only loads or temperatures
 _SOFT = (77, 131, 132, 151, 152, 153, 154, 157, 200)
 # an element without stiffness, and its first options that make it a line or a solid
 _MESH, _MESH_LINES, _MESH_SOLIDS = 200, (0, 1, 2, 3), (8, 9, 10, 11)
-# nodes of a brick whose corners fall together: corners first, then those between them
+# nodes of a brick with coincident corners: corners first, then mid-edge nodes
 _SHAPES = {
     "tetra10": [0, 1, 2, 4, 8, 9, 11, 16, 17, 18],
     "pyramid13": [0, 1, 2, 3, 4, 8, 9, 10, 11, 16, 17, 18, 19],
@@ -69,8 +69,8 @@ def read(path: Path) -> LabelledMesh:
         elif name == "ETBLOCK":
             kinds |= {row[0]: (row[1], row[2] if len(row) > 2 else None) for _, row, _ in _rows(line, lines)}
         elif name in ("KEYOPT", "KEYOP") and len(words) > 2:
-            label, place, option = line.whole(words[:3])
-            if place == 1 and label in kinds:
+            label, number, option = line.whole(words[:3])
+            if number == 1 and label in kinds:
                 kinds[label] = (kinds[label][0], option)
         elif name == "NBLOCK":
             _take_nodes(mesh, line, lines)
@@ -85,8 +85,8 @@ def read(path: Path) -> LabelledMesh:
 
 def _take_nodes(mesh: LabelledMesh, head: DeckLine, lines: Iterator[DeckLine]) -> None:
     rows = list(_rows(head, lines))
-    for line, (label, *_), place in rows:
-        mesh.add_node(line, label, np.array([*place, 0.0, 0.0, 0.0][:3]))  # zeros at the end are left out
+    for line, (label, *_), point in rows:
+        mesh.add_node(line, label, np.array([*point, 0.0, 0.0, 0.0][:3]))  # zeros at the end are left out
     _check_count(head, 4, len(rows), "nodes")
 
 
@@ -99,24 +99,24 @@ def _take_elements(
     for line, row, _ in rows:
         if len(row) < 12:
             raise line.error(f"{len(row)} numbers; expected ten, the element and its nodes")
-        material, (given, option), count, label, nodes = row[0], kinds.get(row[1], (0, None)), row[8], row[10], row[11:]
+        material, (kind, option), count, label, nodes = row[0], kinds.get(row[1], (0, None)), row[8], row[10], row[11:]
         while len(nodes) < count:
             more = next(rows, None)
             if more is None:
                 raise line.error(f"element {label}: expected {count} nodes, not {len(nodes)}")
             nodes += more[1]
         mesh.check_nodes(line, label, filter(None, nodes))
-        if given in _SOLIDS or (given == _MESH and option in _MESH_SOLIDS):
+        if kind in _SOLIDS or (kind == _MESH and option in _MESH_SOLIDS):
             mesh.add_element(line, label, *_solid(line, label, nodes))
-        elif given in _SKINS:
-            most = 2 if given == _MESH and option in _MESH_LINES else 3 if count in (3, 6) else 4
+        elif kind in _SKINS:
+            most = 2 if kind == _MESH and option in _MESH_LINES else 3 if count in (3, 6) else 4
             corners = list(dict.fromkeys(nodes[:most]))
             mesh.add_element(line, label, SHELLS.get(len(corners), "line"), corners)
-            if given not in _SOFT:
-                mesh.stiff[label] = f"its type {given}"
+            if kind not in _SOFT:
+                mesh.stiff[label] = f"its type {kind}"
         else:
             raise line.error(
-                f"element {label} is of the type {given or 'that no ET gives'}; expected solids (185, 186, 187 ...), "
+                f"element {label} is of the type {kind or 'that no ET gives'}; expected solids (185, 186, 187 ...), "
                 "or shells as their skin (154, 181, 200, 281 ...); remove those that join nodes or add mass"
             )
         mesh.element_sets.setdefault(f"material {material}", []).append(label)
@@ -131,8 +131,8 @@ def _solid(line: DeckLine, label: int, nodes: list[int]) -> tuple[str, list[int]
             shape = "tetra10" if folded else "pyramid13"
         elif folded and nodes[6] == nodes[7]:
             shape = "wedge15"
-        places = _SHAPES[shape]
-        nodes = [nodes[place] for place in (places if len(nodes) == 20 else places[: _CORNERS[shape]])]
+        order = _SHAPES[shape]
+        nodes = [nodes[index] for index in (order if len(nodes) == 20 else order[: _CORNERS[shape]])]
     corners = {10: 4, 13: 5, 15: 6, 20: 8}.get(len(nodes), len(nodes))
     if not any(nodes[corners:]):
         nodes = nodes[:corners]
@@ -196,8 +196,8 @@ def _rows(head: DeckLine, lines: Iterator[DeckLine]) -> Iterator[tuple[DeckLine,
     raise cut
 
 
-def _check_count(head: DeckLine, place: int, count: int, what: str) -> None:
+def _check_count(head: DeckLine, column: int, count: int, things: str) -> None:
     """Raise MeshError for a block that has not as many entries as its head announces, where it does."""
-    announced = _words(head)[place : place + 1]
+    announced = _words(head)[column : column + 1]
     if announced and announced[0].isdecimal() and int(announced[0]) != count:
-        raise head.error(f"announces {announced[0]} {what} and has {count}: damaged; write it again")
+        raise head.error(f"announces {announced[0]} {things} and has {count}: damaged; write it again")

@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class CoordinateSystem:
     """A rectangular, cylindrical or spherical system.
 
     origin  (3,)

@@ -60,7 +60,7 @@ class DeckLine(NamedTuple):
             raise self.error(f"expected numbers ({error})") from error
 
     def refuse(self, name: str, refused: Mapping[str, str]) -> None:
-        """Raise MeshError for an entry whose name matches a pattern; refused: the patterns by the reason."""
+        """Raise MeshError for an entry whose name matches a pattern; refused: patterns by reason."""
         for why, pattern in refused.items():
             if re.fullmatch(pattern, name):
                 raise self._replace(within=f"{name} ").error(why)
@@ -84,7 +84,7 @@ class LabelledMesh:
     node_sets     name -> labels of nodes, which may be absent
     element_sets  name -> labels of elements, which may be absent
     face_sets     name -> faces of solids, each as the labels of its corners
-    stiff         label of a shell or line with a stiffness of its own -> what gives it that
+    stiff         label of a shell or line with a stiffness of its own -> the cause of this stiffness
     """
 
     nodes: dict[int, np.ndarray] = field(default_factory=dict)
@@ -98,9 +98,9 @@ class LabelledMesh:
         """Return the coordinates (n, 3) of nodes."""
         return np.array([self.nodes[label] for label in labels]).reshape(-1, 3)
 
-    def add_node(self, line: DeckLine, label: int, place: np.ndarray) -> None:
+    def add_node(self, line: DeckLine, label: int, point: np.ndarray) -> None:
         """Add a node that a line gives. Raises MeshError for one that is given twice, at different places."""
-        if not np.array_equal(self.nodes.setdefault(label, place), place):
+        if not np.array_equal(self.nodes.setdefault(label, point), point):
             raise line.error(f"node {label} is given twice, at different places")
 
     def add_element(self, line: DeckLine, label: int, kind: str, nodes: list[int]) -> None:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.files.formats.meshes.frames import Frame, through
+from vanedamp.files.formats.meshes.frames import CoordinateSystem, through
 from vanedamp.files.formats.meshes.labelled_mesh import (
     LINES,
     SHELLS,
@@ -30,7 +30,7 @@ from vanedamp.files.formats.meshes.labelled_mesh import (
 )
 
 _KINDS = {"R": "rectangular", "C": "cylindrical", "S": "spherical"}
-# number of corners, and of all nodes where those between the corners are given
+# number of corners, and of all nodes with mid-edge nodes
 _ELEMENTS = {
     "CTETRA": (4, 10), "CHEXA": (8, 20), "CPENTA": (6, 15), "CPYRAM": (5, 13), "CPYRA": (5, 13),
     "CTRIA3": (3, 3), "CTRIAR": (3, 3), "CTRIA6": (3, 6), "CQUAD4": (4, 4), "CQUADR": (4, 4), "CQUAD8": (4, 8),
@@ -71,14 +71,14 @@ class _Card(NamedTuple):
         """Return the entry that begins with a line, which messages about it name."""
         return cls(line._replace(within=f"{name}: "), name, fields)
 
-    def number(self, place: int) -> float:
+    def number(self, index: int) -> float:
         """Return a real field, such as 1.5, 1.5+3 or 1.5D3; empty: zero."""
-        word = self.fields[place - 1] if place <= len(self.fields) else ""
+        word = self.fields[index - 1] if index <= len(self.fields) else ""
         return float(re.sub(r"(?<=[\d.])[eEdD]?([+-]\d+)$", r"e\1", re.sub("[dD]", "e", word)) or 0.0)
 
-    def whole(self, place: int) -> int:
+    def whole(self, index: int) -> int:
         """Return a whole field; empty: zero."""
-        word = self.fields[place - 1] if place <= len(self.fields) else ""
+        word = self.fields[index - 1] if index <= len(self.fields) else ""
         return int(word or 0)
 
 
@@ -111,7 +111,7 @@ def _take_element(mesh: LabelledMesh, card: _Card) -> None:
     corners, most = _ELEMENTS[card.name]
     try:
         label, reference = card.whole(1), card.whole(2)
-        nodes = [card.whole(place) for place in range(3, 3 + most)]
+        nodes = [card.whole(index) for index in range(3, 3 + most)]
     except ValueError as error:
         raise card.line.error(f"expected whole numbers ({error})") from error
     kinds = {2: LINES, 3: SHELLS}.get(corners, SHELLS if card.name.startswith("CQUAD") else SOLIDS)
@@ -131,14 +131,14 @@ def _take_element(mesh: LabelledMesh, card: _Card) -> None:
 
 
 class _Numbers(NamedTuple):
-    """Numbers of a set: those named, ranges, and those taken out of the ranges."""
+    """Numbers of a set: single numbers, ranges, and numbers excluded from the ranges."""
 
     named: list[int]
     ranges: list[range]
     without: set[int]
 
     def of(self, labels: Iterable[int]) -> list[int]:
-        """Return those named and the labels in the ranges; of a range Nastran takes those that exist."""
+        """Return the single numbers and the existing labels in the ranges, as Nastran does."""
         inside = (n for n in labels if n not in self.without and any(n in span for span in self.ranges))
         return list(dict.fromkeys([*self.named, *inside]))
 
@@ -156,39 +156,39 @@ def _take_set(mesh: LabelledMesh, card: _Card) -> None:
         if card.name == _COMMAND:  # of real numbers or names: no set of a mesh
             return
         raise card.line.error("expected a number, and numbers with THRU and EXCEPT") from error
-    found = {"grids": numbers.of(mesh.nodes), "elements": numbers.of(mesh.elements)}
+    members = {"grids": numbers.of(mesh.nodes), "elements": numbers.of(mesh.elements)}
     if kind == "PROP":
         references = [name for name in mesh.element_sets if name.isdecimal()]
         chosen = {str(number) for number in numbers.of(int(name) for name in references)}
-        found["elements"] = [label for name in references if name in chosen for label in mesh.element_sets[name]]
-    for what, there, sets, kinds in (
+        members["elements"] = [label for name in references if name in chosen for label in mesh.element_sets[name]]
+    for things, there, sets, kinds in (
         ("grids", mesh.nodes, mesh.node_sets, ("GRID", "")),
         ("elements", mesh.elements, mesh.element_sets, ("ELEM", "PROP", "")),
     ):
-        name = f"set {label} {what}"
-        if kind not in kinds or not any(number in there for number in found[what]):
+        name = f"set {label} {things}"
+        if kind not in kinds or not any(number in there for number in members[things]):
             continue
-        if sets.setdefault(name, found[what]) != found[what]:
+        if sets.setdefault(name, members[things]) != members[things]:
             raise card.line.error(f"set {label} is given twice, with other members")
 
 
 def _numbers(words: list[str]) -> _Numbers:
     """Return the numbers of 1, 3 THRU 9 EXCEPT 5, 6, 20. Raises ValueError or IndexError."""
-    numbers, place, excepted = _Numbers([], [], set()), 0, False
-    while place < len(words):
-        if words[place] == "ALL":
+    numbers, index, excepted = _Numbers([], [], set()), 0, False
+    while index < len(words):
+        if words[index] == "ALL":
             numbers.ranges.append(range(1, 2**31))
-            place += 1
+            index += 1
             continue
-        if words[place] == "EXCEPT":
-            excepted, place = True, place + 1
-        first = last = int(words[place])
-        step, place = 1, place + 1
-        spans = words[place : place + 1] == ["THRU"]
+        if words[index] == "EXCEPT":
+            excepted, index = True, index + 1
+        first = last = int(words[index])
+        step, index = 1, index + 1
+        spans = words[index : index + 1] == ["THRU"]
         if spans:
-            last, place = int(words[place + 1]), place + 2
-        if words[place : place + 1] == ["BY"]:
-            step, place = int(words[place + 1]), place + 2
+            last, index = int(words[index + 1]), index + 2
+        if words[index : index + 1] == ["BY"]:
+            step, index = int(words[index + 1]), index + 2
         excepted = excepted and last < numbers.ranges[-1].stop
         if excepted:
             numbers.without.update(range(first, last + 1, step))
@@ -203,10 +203,10 @@ class _Systems:
     """Coordinate systems and grid points, resolved as they are asked for: each may stand on others."""
 
     def __init__(self, cards: list[_Card]) -> None:
-        self.frames: dict[int, Frame] = {0: Frame()}
-        self.places: dict[int, np.ndarray] = {}
+        self.frames: dict[int, CoordinateSystem] = {0: CoordinateSystem()}
+        self.points: dict[int, np.ndarray] = {}
         self.pending: list[int] = []
-        self.given: dict[int, tuple[_Card, int]] = {}
+        self.systems: dict[int, tuple[_Card, int]] = {}
         self.grids: dict[int, _Card] = {}
         default = 0
         for card in cards:
@@ -214,68 +214,68 @@ class _Systems:
                 if card.name == "GRDSET":
                     default = card.whole(2)
                 elif card.name == "GRID":
-                    known = self.grids.setdefault(card.whole(1), card)
-                    if known.fields != card.fields:
+                    first = self.grids.setdefault(card.whole(1), card)
+                    if first.fields != card.fields:
                         raise ValueError(f"grid point {card.whole(1)} is given twice, at different places")
                 elif re.fullmatch(r"CORD[12][RCS]", card.name):
                     # two systems fit on one CORD1 card
                     second = card.name[4] == "1" and len(card.fields) > 4 and card.fields[4]
                     for start in (0, 4) if second else (0,):
-                        self.given[card.whole(start + 1)] = (card, start)
+                        self.systems[card.whole(start + 1)] = (card, start)
             except ValueError as error:
                 raise card.line.error(f"{error}") from error
         self.default = default
 
     def place(self, label: int) -> np.ndarray:
         """Return the global coordinates (3,) of a grid point."""
-        if label not in self.places:
+        if label not in self.points:
             card = self.grids[label]
             try:
-                own = np.array([[card.number(place) for place in (3, 4, 5)]])
+                local = np.array([[card.number(index) for index in (3, 4, 5)]])
                 system = card.whole(2) if len(card.fields) > 1 and card.fields[1] else self.default
             except ValueError as error:
                 raise card.line.error(f"{error}") from error
-            self.places[label] = self.frame(system, card).to_global(own)[0]
-        return self.places[label]
+            self.points[label] = self.frame(system, card).to_global(local)[0]
+        return self.points[label]
 
-    def frame(self, label: int, asked: _Card) -> Frame:
+    def frame(self, label: int, asked: _Card) -> CoordinateSystem:
         """Return a coordinate system in global terms."""
         if label in self.frames:
             return self.frames[label]
-        if label not in self.given:
+        if label not in self.systems:
             raise asked.line.error(f"the coordinate system {label} is not given")
         if label in self.pending:
             raise asked.line.error(f"the coordinate system {label} stands on itself")
         self.pending.append(label)
-        card, start = self.given[label]
+        card, start = self.systems[label]
         try:
             if card.name[4] == "1":
-                grids = [card.whole(start + place) for place in (2, 3, 4)]
+                grids = [card.whole(start + index) for index in (2, 3, 4)]
                 missing = [grid for grid in grids if grid not in self.grids]
                 if missing:
                     raise ValueError(f"there is no grid point {missing[0]}")
                 points = np.array([self.place(grid) for grid in grids])
             else:
-                values = np.array([card.number(place) for place in range(3, 12)]).reshape(3, 3)
+                values = np.array([card.number(index) for index in range(3, 12)]).reshape(3, 3)
                 points = self.frame(card.whole(2), card).to_global(values)
             z, x, y = through(points[1] - points[0], points[2] - points[0])
         except MeshError:
             raise
         except ValueError as error:
             raise card.line.error(f"{error}") from error
-        self.frames[label] = Frame(points[0], np.array([x, y, z]), _KINDS[card.name[5]])
+        self.frames[label] = CoordinateSystem(points[0], np.array([x, y, z]), _KINDS[card.name[5]])
         return self.frames[label]
 
 
 def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
     """Return the sets of the case control, and the entries of the bulk data: free, small and large fields."""
-    found = list(lines(path))
-    words = [line.text.strip().upper() for line in found]
-    begin = next((place for place, word in enumerate(words) if word.startswith("BEGIN")), -1)
-    end = next((place for place, word in enumerate(words) if word.startswith("ENDDATA")), None)
+    deck = list(lines(path))
+    words = [line.text.strip().upper() for line in deck]
+    begin = next((index for index, word in enumerate(words) if word.startswith("BEGIN")), -1)
+    end = next((index for index, word in enumerate(words) if word.startswith("ENDDATA")), None)
     if end is None:
         raise MeshError(f"{path}: no ENDDATA: cut short, or no file of Nastran; write it again")
-    commands, head = [], iter(found[: max(begin, 0)])
+    commands, head = [], iter(deck[: max(begin, 0)])
     for line in head:
         text = line.text
         while text.endswith(","):
@@ -285,7 +285,7 @@ def _entries(path: Path) -> tuple[list[_Card], list[_Card]]:
         if said:
             commands.append(_Card.at(line, _COMMAND, [said[1], *said[2].replace(",", " ").split()]))
     cards: list[_Card] = []
-    for line in found[begin + 1 : end]:
+    for line in deck[begin + 1 : end]:
         name, fields = _fields(line)
         if not name.startswith(("+", "*")) and name:
             cards.append(_Card.at(line, name.rstrip("*_"), fields))  # meshio writes CTETRA_
@@ -299,9 +299,9 @@ def lines(path: Path, including: tuple[Path, ...] = ()) -> Iterator[DeckLine]:
     including = (*including, path.resolve())
     for line in deck_lines(path):
         text = line.text.split("$")[0].expandtabs(8).rstrip()
-        found = re.fullmatch(r"INCLUDE\s+(['\"]?)(.+)\1", text.strip(), re.IGNORECASE)
-        if found:
-            yield from lines(line._replace(within="INCLUDE ").named_file(found[2], including), including)
+        include = re.fullmatch(r"INCLUDE\s+(['\"]?)(.+)\1", text.strip(), re.IGNORECASE)
+        if include:
+            yield from lines(line._replace(within="INCLUDE ").named_file(include[2], including), including)
         elif text.strip():
             yield line._replace(text=text)
 
@@ -320,4 +320,4 @@ def _fields(line: DeckLine) -> tuple[str, list[str]]:
             )
         return name.upper(), (words[:count] + [""] * count)[:count]
     name = text[:8].strip().upper()
-    return name, [text[8 + width * place : 8 + width * (place + 1)].strip() for place in range(count)]
+    return name, [text[8 + width * index : 8 + width * (index + 1)].strip() for index in range(count)]

@@ -46,8 +46,8 @@ def read(path: Path) -> LabelledMesh:
         str(number): [np.flatnonzero(block == number) for block in references]
         for number in sorted({number for block in references for number in block.tolist()})
     }
-    for name, parts in (numbered | mesh.cell_sets).items():
-        members = [start + np.asarray(part, dtype=int) for start, part in zip(starts, parts, strict=False)]
+    for name, blocks in (numbered | mesh.cell_sets).items():
+        members = [start + np.asarray(indices, dtype=int) for start, indices in zip(starts, blocks, strict=False)]
         labelled.element_sets[name.strip()] = np.concatenate(members).tolist()
     return labelled
 

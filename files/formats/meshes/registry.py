@@ -1,4 +1,4 @@
-"""Which reader takes a mesh file: by its ending."""
+"""Readers of mesh files, by their endings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def read_mesh(path: Path) -> LabelledMesh:
 
 
 def mesh_files(path: str | os.PathLike[str]) -> list[Path]:
-    """Return the files that a mesh is read from: itself and those that it includes. Raises MeshError."""
+    """Return the files that a mesh is read from: itself and the files that it includes. Raises MeshError."""
     file = Path(path)
     lines = _INCLUDING[file.suffix.lower()](file) if file.suffix.lower() in _INCLUDING else ()
     return list(dict.fromkeys([file, *(line.file for line in lines)]))

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vanedamp.files.formats.meshes.frames import Frame
+from vanedamp.files.formats.meshes.frames import CoordinateSystem
 from vanedamp.files.formats.meshes.labelled_mesh import DeckLine, LabelledMesh, MeshError, deck_lines
 from vanedamp.files.formats.meshes.universal_systems import SYSTEMS, frame_of, systems_of
 
@@ -47,17 +47,17 @@ def _whole(line: DeckLine, least: int = 0) -> list[int]:
     return numbers
 
 
-def _place(line: DeckLine) -> np.ndarray:
+def _point(line: DeckLine) -> np.ndarray:
     """Return the last three numbers of a line."""
-    place = np.array(line.reals()[-3:])
-    if place.size < 3:
+    point = np.array(line.reals()[-3:])
+    if point.size < 3:
         raise line.error("expected three coordinates")
-    return place
+    return point
 
 
 def read(path: Path) -> LabelledMesh:
     """Return the mesh of a file with its groups. Raises MeshError with file and line."""
-    mesh, systems, named = LabelledMesh(), dict[int, Frame](), []
+    mesh, systems, named = LabelledMesh(), dict[int, CoordinateSystem](), []
     for number, lines in _datasets(path):
         rows = iter(lines)
         try:
@@ -85,15 +85,15 @@ def read(path: Path) -> LabelledMesh:
 def _datasets(path: Path) -> Iterator[tuple[int, list[DeckLine]]]:
     """Yield number and lines of the datasets, which stand between lines of -1."""
     start, lines = None, deck_lines(path)
-    for place, line in enumerate(lines):
+    for index, line in enumerate(lines):
         if line.text.strip() != "-1":
             continue
         if start is None:
-            start = place + 1
+            start = index + 1
             continue
         head = lines[start].text.split()
-        if place > start and head and head[0].isdecimal():
-            yield int(head[0]), lines[start + 1 : place]
+        if index > start and head and head[0].isdecimal():
+            yield int(head[0]), lines[start + 1 : index]
         start = None
     if start is not None:
         name = "".join(line.text.strip() for line in lines[start : start + 1])
@@ -106,7 +106,7 @@ def _take_node(mesh: LabelledMesh, head: DeckLine, rows: Iterator[DeckLine] | No
     if rows is None and len(words) < 2:
         raise head.error("expected a label and a coordinate system")
     label, system = head.whole(words[:2]) if rows is None else _whole(head, 2)[:2]
-    mesh.add_node(head, label, _place(head if rows is None else next(rows)))
+    mesh.add_node(head, label, _point(head if rows is None else next(rows)))
     return system
 
 
@@ -123,10 +123,10 @@ def _take_element(mesh: LabelledMesh, head: DeckLine, rows: Iterator[DeckLine]) 
     nodes: list[int] = []
     while len(nodes) < width:
         nodes += _whole(next(rows), 1)
-    places = _PLACES.get(kind, range(width))
-    if kind != "wedge15" and len(nodes) != len(places):
-        raise head.error(f"element {label}: {len(nodes)} nodes; a finite element {descriptor} has {len(places)}")
-    mesh.add_element(head, label, kind, [nodes[place] for place in places])
+    order = _PLACES.get(kind, range(width))
+    if kind != "wedge15" and len(nodes) != len(order):
+        raise head.error(f"element {label}: {len(nodes)} nodes; a finite element {descriptor} has {len(order)}")
+    mesh.add_element(head, label, kind, [nodes[index] for index in order])
 
 
 def _take_group(mesh: LabelledMesh, head: DeckLine, rows: Iterator[DeckLine], width: int) -> None:

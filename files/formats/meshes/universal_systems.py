@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vanedamp.files.formats.meshes.frames import Frame, through
+from vanedamp.files.formats.meshes.frames import CoordinateSystem, through
 from vanedamp.files.formats.meshes.labelled_mesh import DeckLine
 
 #: datasets of coordinate systems
@@ -18,12 +18,14 @@ _KINDS = ("rectangular", "cylindrical", "spherical")
 _GLOBAL = (0, 1)
 
 
-def systems_of(number: int, lines: Iterable[DeckLine], known: Mapping[int, Frame]) -> dict[int, Frame]:
-    """Return the systems of a dataset by label; known: those of datasets before it, in which 18 may give its points.
+def systems_of(
+    number: int, lines: Iterable[DeckLine], known: Mapping[int, CoordinateSystem]
+) -> dict[int, CoordinateSystem]:
+    """Return the systems of a dataset by label; known: systems of earlier datasets, in which 18 may give its points.
 
     Raises MeshError with the line, and StopIteration for a dataset that ends within an entry.
     """
-    rows, found = iter(lines), dict[int, Frame]()
+    rows, frames = iter(lines), dict[int, CoordinateSystem]()
     if number == 2420:
         next(rows), next(rows)  # number and name of the part
     for head in rows:
@@ -39,33 +41,33 @@ def systems_of(number: int, lines: Iterable[DeckLine], known: Mapping[int, Frame
             if not np.allclose(axes @ axes.T, np.eye(3), atol=1e-4):
                 raise head.error(f"coordinate system {label}: its axes are not perpendicular unit vectors")
         else:  # points: the origin, one on the axis x, one in the plane of x and z
-            points = frame_of(more[0], head.error, found | dict(known)).to_global(np.reshape(numbers[:9], (3, 3)))
+            points = frame_of(more[0], head.error, frames | dict(known)).to_global(np.reshape(numbers[:9], (3, 3)))
             origin = points[0]
             try:
                 x, z, negative_y = through(points[1] - origin, points[2] - origin)
             except ValueError as error:
                 raise head.error(f"coordinate system {label}: {error}") from error
             axes = np.array([x, -negative_y, z])
-        found[label] = Frame(origin, axes, _KINDS[kind])
-    return found
+        frames[label] = CoordinateSystem(origin, axes, _KINDS[kind])
+    return frames
 
 
-def frame_of(label: int, error: Callable[[str], Exception], known: Mapping[int, Frame]) -> Frame:
+def frame_of(label: int, error: Callable[[str], Exception], known: Mapping[int, CoordinateSystem]) -> CoordinateSystem:
     """Return the system of a label. Raises `error` of a message for one that the file does not give."""
     if label in known or label in _GLOBAL:
-        return known.get(label, Frame())
+        return known.get(label, CoordinateSystem())
     raise error(f"the coordinate system {label} is not given in the file; write global coordinates")
 
 
-def systems(path: Path) -> dict[int, Frame]:
+def systems(path: Path) -> dict[int, CoordinateSystem]:
     """Return the systems of a file that may hold binary datasets. Raises MeshError."""
-    known = dict[int, Frame]()
+    frames = dict[int, CoordinateSystem]()
     text = path.read_bytes().decode("latin-1")
     for dataset in re.finditer(r"^ {4}-1\s*\n +(2420|18) *\r?\n(.*?)^ {4}-1\s*$", text, re.MULTILINE | re.DOTALL):
         first = text.count("\n", 0, dataset.start(2)) + 1
-        lines = [DeckLine(path, first + place, line) for place, line in enumerate(dataset[2].splitlines())]
+        lines = [DeckLine(path, first + index, line) for index, line in enumerate(dataset[2].splitlines())]
         try:
-            known |= systems_of(int(dataset[1]), lines, known)
+            frames |= systems_of(int(dataset[1]), lines, frames)
         except StopIteration:
             raise lines[-1].error(f"dataset {dataset[1]} ends within an entry; write the file again") from None
-    return known
+    return frames

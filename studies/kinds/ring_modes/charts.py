@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 
-from vanedamp.modal.records.campbell import RPM, Crossing
+from vanedamp.modal.records.campbell import RPM, OrderCrossing
 from vanedamp.modal.records.interference import Interference
 from vanedamp.studies.report.charts import COLOURS, Table, dressed
 
@@ -62,7 +62,9 @@ def _add_orders(figure: go.Figure, found: Interference, speed: float, dash: str)
     )  # fmt: skip
 
 
-def _add_meetings(figure: go.Figure, found: Interference, meetings: Sequence[Crossing], x: Sequence[float]) -> None:
+def _add_meetings(
+    figure: go.Figure, found: Interference, meetings: Sequence[OrderCrossing], x: Sequence[float]
+) -> None:
     if meetings:
         figure.add_scatter(
             x=x, y=[meeting.frequency_hz for meeting in meetings], name="meetings", mode="markers", hoverinfo="text",

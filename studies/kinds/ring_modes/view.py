@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import plotly.graph_objects as go
 
-from vanedamp.modal.algebra import turns
+from vanedamp.modal.algebra import sector_rotations
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.report.charts import Table
@@ -90,7 +90,7 @@ def ring_view(modes: RingModes, ring: WholeRing, mode: int) -> go.Figure:
         "mode": mode, "scale": scale, "sectors": modes.sectors, "diameters": modes.diameters.tolist(),
         "families": modes.families.tolist(), "frequencies": modes.frequencies_hz.tolist(),
         "names": [named.name(index) for index in range(len(modes))],
-        "turns": turns(modes.axis, modes.sectors).reshape(-1, 9).tolist(), "rest": _packed(points, "<f4"),
+        "turns": sector_rotations(modes.axis, modes.sectors).reshape(-1, 9).tolist(), "rest": _packed(points, "<f4"),
         "sector": _packed(ring.sector, "<u2"), "node": _packed(node_index, "<u4"),
         "shapes": _packed(np.rint(_STEPS * relative), "<i2"), "steps": _STEPS,
     })  # fmt: skip

@@ -17,7 +17,7 @@ from vanedamp.coupling.quantities import quantity as quantities
 from vanedamp.coupling.quantities.quantity import FAMILIES, evaluated, possible, quantity, table
 from vanedamp.coupling.quantities.sums import COMPLEX, ENERGIES, SUMS, sources_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.record import Columns, Record, declared
+from vanedamp.files.record import NamedArrays, Record, declared
 from vanedamp.files.toml_input import validate
 from vanedamp.studies import kinds
 from vanedamp.studies.cli import main
@@ -253,4 +253,4 @@ def test_records_declare_what_they_are():
             assert declared(record)
             found += [(record.__name__, name) for name in names if name in vars(record)]
     assert len(found) <= BY_HAND, found
-    assert any(isinstance(item[1], Columns) for item in declared(vd.Sweep).values())
+    assert any(isinstance(item[1], NamedArrays) for item in declared(vd.Sweep).values())

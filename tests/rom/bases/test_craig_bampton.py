@@ -63,7 +63,7 @@ def test_contact_mass_of_a_rod(modes):
 def test_both_factorisations_give_one_model(structure, interface, monkeypatch):
     """That of the stiffness itself, and the bordered one, which structures take that supports hold badly."""
     own = reduce(structure, interface, 5, quasi_static=1)
-    assert craig_bampton._held(
+    assert craig_bampton._constrained(
         structure, interface, *interface.restrict(structure), craig_bampton.superlu
     ).error < 1e-10  # fmt: skip
     monkeypatch.setattr(craig_bampton, "_EXACT", 0.0)

@@ -8,7 +8,7 @@ from tests.tools.rings import Chain, LumpedDisk
 from vanedamp.rom.interface import InterfaceCoordinate
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.identification import Identified, deviations_of_modes, deviations_of_responses
-from vanedamp.rom.ring.reduction import Part, reduce_ring
+from vanedamp.rom.ring.reduction import DeviatingPart, reduce_ring
 
 SIZE = 7
 GIVEN = 0.04 * np.random.default_rng(3).standard_normal(SIZE)
@@ -22,7 +22,7 @@ def disk_modes():
 
 
 def disk_ring(disk):
-    part = Part(*map(sparse.csr_array, disk.part))
+    part = DeviatingPart(*map(sparse.csr_array, disk.part))
     return reduce_ring(disk.sector(), [InterfaceCoordinate("tip", "tip", (0, 0, 1), "node")], 2, part=part)
 
 

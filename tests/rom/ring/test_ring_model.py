@@ -8,7 +8,7 @@ from scipy import linalg
 
 from tests.tools.rings import Chain
 from vanedamp.rom.ring.deviations import Deviations, RingError
-from vanedamp.rom.ring.placement import sector_label, turns
+from vanedamp.rom.ring.placement import sector_label, sector_rotations
 from vanedamp.rom.ring.ring_model import RingModel
 
 DEVIATIONS = Deviations(
@@ -69,7 +69,9 @@ def test_interface_is_turned_into_place():
 
 
 def test_turns_are_right_handed():
-    np.testing.assert_allclose(turns(np.array([0.0, 0.0, 1.0]), 4)[1] @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(
+        sector_rotations(np.array([0.0, 0.0, 1.0]), 4)[1] @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-15
+    )
 
 
 def test_record(tmp_path: Path):

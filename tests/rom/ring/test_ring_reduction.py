@@ -12,8 +12,8 @@ from tests.tools.rings import LumpedDisk
 from vanedamp.rom.interface import InterfaceCoordinate
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.forced import forced
-from vanedamp.rom.ring.placement import turns
-from vanedamp.rom.ring.reduction import Part, reduce_ring
+from vanedamp.rom.ring.placement import sector_rotations
+from vanedamp.rom.ring.reduction import DeviatingPart, reduce_ring
 from vanedamp.rom.ring.ring_model import RingModel
 
 TIP = [InterfaceCoordinate("tip", "tip", (0, 1, 0), "node"), InterfaceCoordinate("root", "root", (1, 0, 0), "node")]
@@ -22,8 +22,8 @@ LOW, HIGH = 480.0, 640.0
 CENTRIFUGAL = sparse.csr_array(np.diag(np.repeat([0.2, 0.2, 0.4, 0.3, 0.3, 0.2], 3)))
 
 
-def part(disk: LumpedDisk) -> Part:
-    return Part(*map(sparse.csr_array, disk.part))
+def part(disk: LumpedDisk) -> DeviatingPart:
+    return DeviatingPart(*map(sparse.csr_array, disk.part))
 
 
 @lru_cache
@@ -64,7 +64,7 @@ def test_base_load_is_that_of_the_whole_ring():
     stiffness, mass, _ = disk.whole(deviations)
     shapes = linalg.eigh(stiffness, mass)[1]
     # a base acceleration loads the masses as they stand, turned with their sectors
-    frames = turns(np.array([0.0, 0.0, 1.0]), 6)
+    frames = sector_rotations(np.array([0.0, 0.0, 1.0]), 6)
     own = np.concatenate([frame.T for frame in frames for _ in range(5)])
     load = shapes.T @ (mass @ own)
     model = ring.model(deviations)

@@ -11,7 +11,7 @@ from tests.rom.ring.test_ring_reduction import TIP, drawn, part, rows
 from tests.tools.rings import Chain, LumpedDisk
 from vanedamp.coupling.scene.structures import Structure
 from vanedamp.files.toml_input import STRICT, validate
-from vanedamp.modal.cyclic import Spring, cyclic_sector
+from vanedamp.modal.cyclic import SectorSpring, cyclic_sector
 from vanedamp.modal.matrices import Patch, SystemMatrices
 from vanedamp.rom.interface import InterfaceCoordinate
 from vanedamp.rom.ring.deviations import Deviations, RingError
@@ -98,7 +98,7 @@ def test_one_mass_a_sector(basis, families):
     patch = {"tip": Patch(np.array([0]), np.ones(1))}
     diagonals = (sparse.csr_array(value * np.eye(3)) for value in (chain.stiffness, chain.mass))
     mass = SystemMatrices(*diagonals, np.array([[0.2, 0.0, 0.0]]), np.empty(0, int), patch, chain.damping_ratio)
-    sector = cyclic_sector(mass, None, None, 8, couplings=(Spring("tip", "tip", (chain.coupling,) * 3),))
+    sector = cyclic_sector(mass, None, None, 8, couplings=(SectorSpring("tip", "tip", (chain.coupling,) * 3),))
     ring = reduce_ring(sector, [InterfaceCoordinate("tip", "tip", (0, 0, 1), "node")], families, basis=basis)
     deviations = Deviations(stiffness=np.linspace(-0.1, 0.1, 8))
     response = forced_response(ring, 2, np.array([310.0, 333.0]), "tip", deviations=deviations)

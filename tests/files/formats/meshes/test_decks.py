@@ -6,7 +6,7 @@ import pytest
 from tests.tools.input_files import BLOCK
 from vanedamp.files.formats.meshes import abaqus, nastran, universal
 from vanedamp.files.formats.meshes.labelled_mesh import MeshError
-from vanedamp.meshes.benchmarks import Block, build
+from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.elasticity import Material, assemble
 from vanedamp.modal.mesh_import import convert
@@ -275,7 +275,7 @@ def test_nodes_in_systems_of_universal_files(systems, told, tmp_path):
 def test_a_cylindrical_deck_has_the_frequencies_of_the_block(tmp_path, monkeypatch, capfd):
     """The whole way by the command: meshlane alone reads a radius and an angle as x and y."""
     monkeypatch.chdir(tmp_path)
-    path = build(Block(0.1, 0.02, 0.01, divisions=(6, 2, 1)), tmp_path / "block.msh")
+    path = build(TaperedBlock(0.1, 0.02, 0.01, divisions=(6, 2, 1)), tmp_path / "block.msh")
     mesh = meshlane.read(path)
     cells = mesh.cells_dict["tetra"]
     deck = "*NODE, SYSTEM=C\n" + nodes(cylindrical(mesh.points)) + "*ELEMENT, TYPE=C3D4, ELSET=block\n"
