@@ -52,7 +52,7 @@ def joint(elements, **tables) -> Scene:
 
 def test_subsystems_that_memory_does_not_hold_are_found_again(monkeypatch):
     """A ring of eight bodies that stick and rest at walls: with room for four subsystems only, the same to the bit."""
-    scene = ring(8, 1, periods=60).replace({f"cavity.{s}.gap": 3e-5 for s in range(4)})
+    scene = ring(8, 1, periods=20).replace({f"cavity.{s}.gap": 3e-5 for s in range(4)})
     whole = simulate(scene)
     assert whole.counters["subsystems"] > 12
     monkeypatch.setattr(known, "_STRUCTURES", known._Structures())
@@ -81,7 +81,7 @@ def test_equal_bodies_on_springs_are_one(bodies):
     """Elastic springs: the dashpot of a damped contact belongs to the reduced mass, which is another for a part."""
 
     def sprung(count):
-        scene = cluster(count, contact={"law": "compliant", "stiffness": 2e6 / count})
+        scene = cluster(count, periods=2, contact={"law": "compliant", "stiffness": 2e6 / count})
         return simulate(scene.replace({f"damper.{i}.restitution": 1.0 for i in range(count)}))
 
     one, many = sprung(1), sprung(bodies)
