@@ -291,7 +291,7 @@ def test_the_peak_of_a_linear_response_follows_its_damping():
         structure={"model": "rigid", "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
         excitation={"frequency": 0.98 / (2 * math.pi), "force": 1.0}, time={"periods": 1, "transient": 0},
         orbit={
-            "to": 1.02 / (2 * math.pi), "start": "linear", "step": 0.1, "max_step": 0.3,
+            "to": 1.02 / (2 * math.pi), "start": "linear", "step": 0.3, "max_step": 1.0,
             "track": {"parameter": "structure.damping", "to": 0.12},
         },
     )  # fmt: skip
