@@ -337,9 +337,7 @@ def test_a_branch_keeps_its_sequence_while_both_of_its_impacts_come_to_graze():
         assert state == pytest.approx(replace(orbit, omega=2 * math.pi * frequency).state, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("restitution", "phase"), cases([(0.3, 0.0), (0.5, 20.0), (0.8, 60.0)], fast=[(0.5, 20.0)])
-)
+@pytest.mark.parametrize(("restitution", "phase"), cases([(0.3, 0.0), (0.5, 20.0), (0.8, 60.0)], fast=[(0.5, 20.0)]))
 def test_a_branch_of_a_ball_doubles_and_turns_where_holmes_has_it(restitution, phase):
     """Where two orbits meet the impact is at phase 0 of the sine, which is the start of the period or not."""
     unit = 10.0 / (2 * math.pi) ** 2
