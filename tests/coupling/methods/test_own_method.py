@@ -234,7 +234,7 @@ def test_runs_like_any_other_method():
         assert response.energy["friction"] == pytest.approx(exact.energy["friction"], rel=0.1)
         return np.abs(response.displacement - exact.displacement).max() / exact.amplitude_max
 
-    assert error(4000) < min(0.05, 0.5 * error(500))
+    assert error(2000) < min(0.05, 0.5 * error(500))
 
 
 def test_its_option_counts():
@@ -246,7 +246,7 @@ def test_its_option_counts():
 
 def test_goes_through_a_sweep_and_its_workers():
     """Over the method and its steps; workers find the method by its entry point, too."""
-    axes = {"solver.method": ["exact", "leapfrog"], "cavity.c.gap": [0.4, 0.5, 0.6]}
+    axes = {"solver.method": ["exact", "leapfrog"], "cavity.c.gap": [0.4, 0.6]}
     found = sweep(scene(sweep=axes))
     for row, method in enumerate(axes["solver.method"]):
         for column, gap in enumerate(axes["cavity.c.gap"]):
@@ -302,7 +302,7 @@ def test_what_it_cannot_do_is_refused():
 
 def test_appears_in_the_chart(tmp_path, monkeypatch):
     """Measured like ours, and drawn: in the legend with its own marks, beside all that did not fail."""
-    effort = charts.Settings(1, (100, 200), (1e-4,), 1, 60, 200, 2, 1e5, 200, None, (), longest=math.inf)
+    effort = charts.Settings(1, (100, 200), (1e-4,), 1, 20, 60, 2, 1e5, 200, None, (), longest=math.inf)
     lossy = scene(damper=[DATA["damper"][0] | {"restitution": 0.9}])
     measured = charts.Chart("one body", lambda: lossy, True, effort)
     chart = measured.measure(Rows(tmp_path, "work-precision", {}, measured.rows()), 0)

@@ -170,7 +170,7 @@ def test_penalty_is_of_order_two_thirds(periodic):
 
 def steady(scene, **solver):
     """The response of a scene that begins in its exact steady state, where a method has reached its own."""
-    return simulate(by(scene.replace({"time.periods": 600, "time.transient": 300}), **solver))
+    return simulate(by(scene.replace({"time.periods": 300, "time.transient": 150}), **solver))
 
 
 @pytest.mark.parametrize("name", METHODS)

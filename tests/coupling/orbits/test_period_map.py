@@ -11,6 +11,7 @@ from tests.reference.fixed_sequence import FixedSequence
 from tests.tools.closed_form_scenes import ball, period_one_start, rubbing, scene
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_reduced, random_scene
 from tests.tools.sensitive_scenes import KINDS, numbers_of, scene_of
+from tests.tools.tiers import seeds
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
@@ -432,7 +433,8 @@ def test_crossings_come_in_order_with_their_losses():
     assert sum(crossing.energy for crossing in crossings) == pytest.approx(run.energy["impact"], rel=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(len(KINDS)))
+# 51 and 90 are of the kinds of 13 and 14, with tens of events in a period in place of thousands
+@pytest.mark.parametrize("seed", [*seeds(len(KINDS), fast=set(range(len(KINDS))) - {13, 14}), 51, 90])
 def test_passages_do_not_depend_on_those_before(seed, tmp_path):
     """Of other states, lengths and numbers: a map keeps its run, its flows and room for derivatives."""
     try:
@@ -442,14 +444,13 @@ def test_passages_do_not_depend_on_those_before(seed, tmp_path):
         pytest.skip("no scene")
     one = found.linear_orbit()
     other = one + 0.3 * found.scale * np.random.default_rng(seed).normal(size=len(one))
-    path = list(numbers_of(scene, False))[:2]
-    for state in (one, other, one):
-        for made in (found, found.over(2), found.by(tuple(path))):
-            fresh = replace(made, earlier=[])(state)
-            again = made(state)
-            assert again.status is fresh.status and again.crossings == fresh.crossings
-            for name in ("state", "derivative", "by_number", "peaks"):
-                assert np.array_equal(getattr(again, name), getattr(fresh, name), equal_nan=True)
+    longer, by_numbers = found.over(2), found.by(tuple(list(numbers_of(scene, False))[:2]))
+    for made, state in ((found, one), (by_numbers, other), (longer, one), (by_numbers, one), (found, other)):
+        fresh = replace(made, earlier=[])(state)
+        again = made(state)
+        assert again.status is fresh.status and again.crossings == fresh.crossings
+        for name in ("state", "derivative", "by_number", "peaks"):
+            assert np.array_equal(getattr(again, name), getattr(fresh, name), equal_nan=True)
 
 
 @pytest.mark.parametrize(("seed", "periods"), [(0, 12), (2, 12), (4, 12), (5, 12), (9, 12), (17, 150)])

@@ -97,7 +97,9 @@ class Place:
         return [(i, *self.flows.slow[self.s, i, :3]) for i in range(self.slow_count)]
 
 
-@pytest.fixture(params=[(kind, modes, bodies) for kind in KINDS for modes, bodies in ((1, 1), (4, 2))], ids=str)
+@pytest.fixture(
+    scope="module", params=[(kind, modes, bodies) for kind in KINDS for modes, bodies in ((1, 1), (4, 2))], ids=str
+)
 def places(request):
     """Subsystems of some scenes of a kind: (system, place, amplitudes)."""
     kind, modes, bodies = request.param

@@ -10,18 +10,21 @@ import pytest
 from tests.reference.comparison import SAMPLES, compare_motion, impacts
 from tests.reference.integrator import with_horizon
 from tests.tools.random_scenes import random_reduced, random_scene
+from tests.tools.tiers import cases
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.simulation import simulate
 
 PERIODS = 10
+#: seeds of each kind of structure and number of bodies
+KINDS = {("rigid", 1): 20, ("prescribed", 1): 10, ("rigid", 2): 10, ("rom", 2): 10}
 
 
 @pytest.mark.parametrize(
     ("structure", "bodies", "seed"),
-    [("rigid", 1, seed) for seed in range(20)]
-    + [("prescribed", 1, seed) for seed in range(10)]
-    + [("rigid", 2, seed) for seed in range(10)]
-    + [("rom", 2, seed) for seed in range(10)],
+    cases(
+        [(*kind, seed) for kind, count in KINDS.items() for seed in range(count)],
+        fast=[(*kind, seed) for kind in KINDS for seed in (0, 2, 5)],
+    ),
 )
 def test_motion_equals_dop853(structure, bodies, seed, tmp_path):
     scene = random_scene(seed, structure, bodies).replace({"time.periods": PERIODS, "time.transient": 0})

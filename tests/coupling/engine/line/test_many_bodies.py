@@ -5,6 +5,7 @@ import pytest
 
 from tests.coupling.orbits.test_waves import ring
 from tests.tools.laws_by_event import check_events
+from tests.tools.tiers import cases
 from vanedamp.coupling.engine import known
 from vanedamp.coupling.engine.line import subsystem_assembly, subsystems
 from vanedamp.coupling.response.response import Status
@@ -51,7 +52,7 @@ def joint(elements, **tables) -> Scene:
 
 def test_subsystems_that_memory_does_not_hold_are_found_again(monkeypatch):
     """A ring of eight bodies that stick and rest at walls: with room for four subsystems only, the same to the bit."""
-    scene = ring(8, 1, periods=60).replace({f"cavity.{s}.gap": 3e-5 for s in range(4)})
+    scene = ring(8, 1, periods=20).replace({f"cavity.{s}.gap": 3e-5 for s in range(4)})
     whole = simulate(scene)
     assert whole.counters["subsystems"] > 12
     monkeypatch.setattr(known, "_STRUCTURES", known._Structures())
@@ -63,7 +64,7 @@ def test_subsystems_that_memory_does_not_hold_are_found_again(monkeypatch):
     assert few.energy_residual == whole.energy_residual < 1e-9
 
 
-@pytest.mark.parametrize("bodies", BODIES)
+@pytest.mark.parametrize("bodies", cases(BODIES, fast=[33, 65, 100]))
 def test_equal_bodies_are_one(bodies):
     """Equal bodies in equal cavities do what one body of their mass does, one impact of it being one of each."""
     one, many = simulate(cluster(1)), simulate(cluster(bodies))
@@ -75,12 +76,12 @@ def test_equal_bodies_are_one(bodies):
     assert many.energy_residual < 1e-10
 
 
-@pytest.mark.parametrize("bodies", [33, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("bodies", cases((33, 100), fast=[33]))
 def test_equal_bodies_on_springs_are_one(bodies):
     """Elastic springs: the dashpot of a damped contact belongs to the reduced mass, which is another for a part."""
 
     def sprung(count):
-        scene = cluster(count, contact={"law": "compliant", "stiffness": 2e6 / count})
+        scene = cluster(count, periods=2, contact={"law": "compliant", "stiffness": 2e6 / count})
         return simulate(scene.replace({f"damper.{i}.restitution": 1.0 for i in range(count)}))
 
     one, many = sprung(1), sprung(bodies)
@@ -89,7 +90,7 @@ def test_equal_bodies_on_springs_are_one(bodies):
     assert many.slip[:, 0] == pytest.approx(one.slip[:, 0], abs=1e-8 * 15e-6)
 
 
-@pytest.mark.parametrize("bodies", [33, 65, *(pytest.param(count, marks=pytest.mark.slow) for count in (100, 200))])
+@pytest.mark.parametrize("bodies", cases(BODIES, fast=[33]))
 def test_bodies_at_different_places_equal_time_stepping(bodies):
     """Moreau's scheme beside the engine over one period: its error is of the first order in the step."""
     exact = simulate(cluster(bodies, spread=1.0, periods=1))
@@ -106,7 +107,7 @@ def test_bodies_at_different_places_equal_time_stepping(bodies):
     assert errors[1] < 0.5 * errors[0]
 
 
-@pytest.mark.parametrize("elements", [33, 100])
+@pytest.mark.parametrize("elements", cases((33, 65, 100), fast=[65]))
 def test_an_iwan_joint_equals_time_stepping(elements):
     """Newmark's scheme converges to the engine with the square of its step."""
     exact = simulate(joint(elements))

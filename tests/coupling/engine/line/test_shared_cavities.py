@@ -5,13 +5,14 @@ import pytest
 
 from tests.reference.integrator import with_horizon
 from tests.tools.random_scenes import random_scene
+from tests.tools.tiers import seeds
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.simulation import simulate
 
 
 @pytest.mark.parametrize("structure", ["rigid", "prescribed"])
 @pytest.mark.parametrize("bodies", [2, 3, 6])
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", seeds(10, fast=[0, 1, 2]))
 def test_random_rows_of_bodies(structure, bodies, seed):
     scene = random_scene(seed, structure, bodies, shared=True).replace({"time.periods": 10, "time.transient": 0})
     response = simulate(scene, samples_per_period=32)
@@ -23,7 +24,7 @@ def test_random_rows_of_bodies(structure, bodies, seed):
     assert np.diff(slips, axis=1).min() >= -1e-11
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", seeds(8, fast=[5, 6, 7]))
 def test_two_bodies_in_one_cavity_equal_dop853(seed):
     periods = 3
     scene = random_scene(seed, "rigid", 2, shared=True).replace({"time.periods": periods, "time.transient": 0})

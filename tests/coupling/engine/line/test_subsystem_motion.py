@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, null_space
 
+from tests.tools.tiers import cases, seeds
 from vanedamp.coupling.engine.known import IllConditioned, with_place
 from vanedamp.coupling.engine.line.flow_assembly import fill, new_assembly_scratch
 from vanedamp.coupling.engine.line.subsystem_assembly import empty_flows
@@ -147,12 +148,14 @@ def check(system, rng):
     return checked
 
 
+@pytest.mark.parametrize("seed", seeds(3, fast=[0]))
 @pytest.mark.parametrize("labels", ["one", "three"])
-@pytest.mark.parametrize(("modes", "bodies"), [(1, 1), (2, 1), (1, 2), (3, 2), (4, 3), (6, 3)])
-def test_flow_equals_the_matrix_exponential(modes, bodies, labels):
+@pytest.mark.parametrize(
+    ("modes", "bodies"), cases([(1, 1), (2, 1), (1, 2), (3, 2), (4, 3), (6, 3)], fast=[(2, 1), (1, 2), (3, 2), (4, 3)])
+)
+def test_flow_equals_the_matrix_exponential(modes, bodies, labels, seed):
     """Every subsystem of bodies that stick, rest at walls and push each other, under non-proportional damping."""
-    checked = sum(check(*random_system(seed, modes, bodies, labels)) for seed in range(3))
-    assert checked >= 3 * 2**bodies
+    assert check(*random_system(seed, modes, bodies, labels)) >= 2**bodies
 
 
 def test_flow_of_a_proportionally_damped_structure():

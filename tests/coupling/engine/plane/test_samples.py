@@ -47,7 +47,8 @@ def mixed(**changes):
 )
 def test_gaps_are_those_of_the_sampled_poses(solver):
     """In the frame of the cavity a corner is at the body's place, less its height times the tilt; so are its gaps."""
-    response = simulate(validate(Scene, mixed(solver=solver), "scene"), samples_per_period=100)
+    periods = {"time": {"periods": 4, "transient": 1}} if solver.get("method") == "solve_ivp" else {}
+    response = simulate(validate(Scene, mixed(solver=solver, **periods), "scene"), samples_per_period=100)
     plane, slip = response.in_plane, response.body_displacement
     assert [sum(body == k for body, _, _ in plane.contacts) for k in range(3)] == [8, 4, 2]
     half = np.array([0.01, 0.005])

@@ -6,7 +6,7 @@ To that comes what a run with ten times the tolerance is off, as errors also beg
 """
 
 import math
-from itertools import count
+from itertools import count, product
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from tests.tools.laws_of_runs import SETTINGS, whole
 from tests.tools.random_scenes import random_jenkins, random_scene
 from tests.tools.scene_strategies import scene_of, scene_tables
+from tests.tools.tiers import cases
 from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
@@ -112,10 +113,17 @@ def who(event):
     return event.damper, event.side
 
 
-@pytest.mark.parametrize("structure", ["rigid", "prescribed"])
-@pytest.mark.parametrize("bodies", [2, 3, 4])
-@pytest.mark.parametrize("seed", range(3))
-def test_random_rows_of_bodies(structure, bodies, seed):
+@pytest.mark.parametrize(
+    ("seed", "bodies", "structure"),
+    cases(
+        product(range(3), (2, 3, 4), ("rigid", "prescribed")),
+        fast=[
+            (1, 2, "rigid"), (2, 2, "prescribed"), (1, 3, "rigid"), (0, 3, "prescribed"), (0, 4, "rigid"),
+            (0, 4, "prescribed"),
+        ],
+    ),
+)  # fmt: skip
+def test_random_rows_of_bodies(seed, bodies, structure):
     assert check(random_row(seed, structure, bodies)) >= LEAST
 
 
@@ -141,7 +149,7 @@ def check_drawn(data):
     return check(scene, factor=1e5) if whole(scene, simulate(scene)) else 0
 
 
-@pytest.mark.parametrize("examples", [15, pytest.param(300, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", cases((5, 15, 300), fast=[5]))
 def test_drawn_scenes(examples):
     compared = []
 

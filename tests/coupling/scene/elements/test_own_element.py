@@ -154,7 +154,7 @@ BODIES = {
 @pytest.mark.parametrize("body", BODIES)
 def test_engine_and_solve_ivp_agree_between_walls(body):
     """Walls that rebound, a floor that rubs and a tether, in one and the same engine."""
-    data = SHAKEN | {"damper": [BODIES[body]], "time": {"periods": 4, "transient": 0}}
+    data = SHAKEN | {"damper": [BODIES[body]], "time": {"periods": 2, "transient": 0}}
     runs = [
         simulate(validate(Scene, data | {"solver": solver}, "scene"), events=True, samples_per_period=100)
         for solver in ({"method": "exact"}, {"method": "solve_ivp", "rtol": 1e-10, "steps_per_period": 100})
@@ -162,7 +162,7 @@ def test_engine_and_solve_ivp_agree_between_walls(body):
     assert {"left", "right", "tether"} <= {event.side for event in runs[0].event_list if event.kind == "impact"}
     for run in runs:
         assert abs(run.energy_residual) < 1e-8
-        np.testing.assert_allclose(run.displacement[:200], runs[0].displacement[:200], atol=1e-7 * run.amplitude_max)
+        np.testing.assert_allclose(run.displacement, runs[0].displacement, atol=1e-7 * run.amplitude_max)
 
 
 def between_tethers(**more):
@@ -238,7 +238,7 @@ def shrouds(folder, solver=METHODS["exact"][0], **more):
     model.save(folder / "rom.h5")
     data = {
         "structure": {"model": "rom", "file": str(folder / "rom.h5")},
-        "excitation": {"frequency": 5.0, "force": 40.0, "at": "one"},
+        "excitation": {"frequency": 20.0, "force": 40.0, "at": "one"},
         "shroud": [{"at": "one", "to": "two", "gap": GAP, "restitution": 0.5}],
         "time": {"periods": 1, "transient": 0}, "solver": solver,
     }  # fmt: skip
@@ -262,7 +262,7 @@ def test_shrouds_meet_by_their_relative_motion(method, engine, tmp_path):
     response = simulate(scene, events=True)
     first = next(event for event in response.event_list if event.kind == "impact")
     assert (first.damper, first.side) == (0, "shroud")
-    own, omega = 200.0, 10 * math.pi
+    own, omega = 200.0, 40 * math.pi
     gain = 40.0 / (own**2 - omega**2)
 
     def motion(t):

@@ -142,8 +142,9 @@ SHAKEN = {
 @pytest.mark.parametrize("shape", SHAPES_OF)
 def test_no_corner_gets_through_and_no_energy_is_lost(shape, method):
     body = SHAPES_OF[shape] | {"mass": 0.3, "friction": 0.2, "restitution": E, "tilt": TILT, "lift": 2e-4}
-    solver = METHODS[method][0] | {"linearisation": 1.0} | ({"steps_per_period": 4000} if method == "moreau" else {})
-    scene = planar_scene(SHAKEN | {"solver": solver}, body, periods=3, gap=2e-3, play=1e-3)
+    solver = METHODS[method][0] | {"linearisation": 1.0}
+    solver |= {"exact": {}, "moreau": {"steps_per_period": 4000}, "solve_ivp": {"steps_per_period": 400}}[method]
+    scene = planar_scene(SHAKEN | {"solver": solver}, body, periods=2, gap=2e-3, play=1e-3)
     response = simulate(scene, events=True, samples_per_period=200)
     struck = {event.side for event in response.event_list if event.kind == "impact"}
     assert struck >= {"left", "right", "floor"}
