@@ -52,8 +52,10 @@ def names(tree):
             yield from (each.name for each in node.names)
         elif isinstance(node, ast.ImportFrom) and not node.level:
             yield node.module
-        elif isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ("import_module", "importorskip"):
-            yield from (word.value for word in node.args[:1] if isinstance(word, ast.Constant))
+        elif isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            if called in ("import_module", "importorskip"):
+                yield from (word.value for word in node.args[:1] if isinstance(word, ast.Constant))
 
 
 def distributions(module):

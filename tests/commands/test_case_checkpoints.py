@@ -9,6 +9,7 @@ from tests.commands.test_info import ROTATING
 from tests.commands.test_ring import DISK, TURNING
 from tests.tools.input_files import DAMPED_BLOCK, changed
 from tests.tools.processes import environment
+from tests.tools.tiers import cases
 from vanedamp.files.store import load
 from vanedamp.studies.cli import BAD_INPUT, main
 
@@ -58,8 +59,11 @@ def signalled(folder, command, number, writes, *words):
 
 @pytest.mark.parametrize(
     ("case", "number", "writes", "status"),
-    [("campbell", 9, 1, -9), ("gyroscopic", 15, 1, 143), ("ring", 9, 2, -9), ("calibrate", 2, 2, 130),
-     ("calibrate", 15, 1, 143), ("calibrate", 9, 3, -9)],
+    cases(
+        [("campbell", 9, 1, -9), ("gyroscopic", 15, 1, 143), ("ring", 9, 2, -9), ("calibrate", 2, 2, 130),
+         ("calibrate", 15, 1, 143), ("calibrate", 9, 3, -9)],
+        fast=[("campbell", 9, 1, -9), ("gyroscopic", 15, 1, 143), ("ring", 9, 2, -9), ("calibrate", 2, 2, 130)],
+    ),
 )  # fmt: skip
 def test_a_stopped_command_resumes(tmp_path, monkeypatch, case, number, writes, status):
     monkeypatch.chdir(tmp_path)

@@ -16,6 +16,7 @@ import pytest
 
 from tests.tools.input_files import DAMPED_BLOCK, SCENE, rom_scene
 from tests.tools.processes import ROOT, environment, vanedamp, without_stages
+from tests.tools.tiers import cases
 from vanedamp.files.store import StoreError, Variable, load, replacing, save
 from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal.matrix_files import FILES
@@ -218,9 +219,10 @@ def test_full_output(folder, words):
         assert without_stages(finished.stderr) == told
 
 
-@pytest.mark.parametrize(
-    "variables", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
-)
+POSIX = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
+@pytest.mark.parametrize("variables", cases([{"PYTHONIOENCODING": "ascii"}, POSIX], fast=[POSIX]))
 def test_output_that_holds_ascii_only(tmp_path, variables):
     answer = "5 \N{MICRO SIGN}m"
     save(tmp_path / "own.h5", "own", {}, {"answer": answer})

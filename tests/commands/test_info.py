@@ -149,10 +149,10 @@ def test_results_are_read_without_finite_elements(folder, tmp_path):
 import contextlib, sys
 import vanedamp as vd
 from vanedamp.studies.cli import main
+assert main(["report", *sys.argv[1:], "-o", "report.html"]) == 0
 for file in sys.argv[1:]:
     assert main(["info", file]) == 0
     assert main(["export", file, "-o", "it.mat"]) == 0
-    assert main(["report", file, "-o", "report.html"]) == 0
     with contextlib.suppress(vd.InputError):
         vd.plot(file)
 """
@@ -182,8 +182,10 @@ def test_foreign_and_broken_files_are_rejected(folder, monkeypatch, capfd):
 
 def kinds_in_the_code():
     """Kinds of the records that the product writes: what its modules and classes keep as KIND, or pass to `save`."""
-    for path in (path for part in ("modal", "rom", "coupling", "studies") for path in (ROOT / part).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    paths = (path for part in ("modal", "rom", "coupling", "studies") for path in (ROOT / part).rglob("*.py"))
+    texts = (path.read_text(encoding="utf-8") for path in paths)
+    for text in (text for text in texts if re.search(r"KIND|_kind|\bsave\(", text)):
+        for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Assign | ast.AnnAssign):
                 target = node.targets[0] if isinstance(node, ast.Assign) else node.target
                 named = getattr(target, "id", "") in ("KIND", "_KIND", "_kind")

@@ -16,6 +16,7 @@ import pytest
 
 from tests.tools.input_files import BLOCK, SCENE, changed
 from tests.tools.processes import PATIENCE, environment, until, without_stages
+from tests.tools.tiers import cases
 from vanedamp.files.interrupts import uninterrupted
 from vanedamp.files.store import StoreError, replacing, together
 from vanedamp.studies.interrupts import swallowed_interrupts_again
@@ -91,29 +92,35 @@ def check(process, folder, ended=(130, "", "vanedamp: interrupted\n")):
     assert {path.name for path in folder.iterdir()} <= {"scene.toml", "sweep.h5", "sweep.h5.partial"}
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+#: (event, end of its name, the how-many-th): before workers start, and after
+EVENTS = [
+    ("import", "vanedamp.files.store", 1),
+    ("open", "scene.toml", 1),
+    ("import", "vanedamp.coupling.sweep.sweep", 1),
+    ("import", "numba.core.caching", 1),
+    ("import", "vanedamp.coupling.sweep.schedule", 1),
+    ("os.rename", ".partial", 1),
+    ("os.rename", ".partial", 2),
+]
+
+
 @pytest.mark.parametrize(
-    ("event", "end", "count"),
-    [
-        ("import", "vanedamp.files.store", 1),
-        ("open", "scene.toml", 1),
-        ("import", "vanedamp.coupling.sweep.sweep", 1),
-        ("import", "numba.core.caching", 1),
-        ("import", "vanedamp.coupling.sweep.schedule", 1),
-        ("os.rename", ".partial", 1),
-        ("os.rename", ".partial", 2),
-    ],
+    ("event", "end", "count", "workers"),
+    cases(
+        [(*event, workers) for event in EVENTS for workers in (1, 2)],
+        fast=[*((*event, 1) for event in EVENTS[:-2]), (*EVENTS[4], 2), (*EVENTS[5], 2), (*EVENTS[6], 1)],
+    ),
 )
 def test_interrupt_at_an_event(event, end, count, workers, tmp_path):
     check(sweep(tmp_path, workers, event, end, count), tmp_path)
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", cases([1, 2], fast=[2]))
 def test_interrupt_while_compiled_functions_are_loaded(count, tmp_path):
     check(sweep(tmp_path, 1, "open", ".nbc", count), tmp_path)
 
 
-@pytest.mark.parametrize("processes", [2, 3, 4])
+@pytest.mark.parametrize("processes", cases([2, 3, 4], fast=[2, 4]))
 def test_interrupt_while_workers_start(processes, tmp_path):
     process = sweep(tmp_path, 2)
     until(lambda: len(members(process.pid)) >= processes)

@@ -13,8 +13,8 @@ from matplotlib import pyplot as plt
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 #: those that take some seconds each
 SLOW = {
-    "bladed_disk", "friction_and_restitution", "gap_sweep", "methods_compared", "optimum", "orbit_branch", "run_up",
-    "stator_ring",
+    "bladed_disk", "campbell_diagram", "friction_and_restitution", "gap_sweep", "methods_compared", "optimum",
+    "orbit_branch", "run_up", "stator_ring",
 }  # fmt: skip
 #: those of finite elements
 ELEMENTS = {"bladed_disk", "campbell_diagram", "reduced_model", "stator_ring"}

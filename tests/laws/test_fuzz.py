@@ -11,6 +11,7 @@ import pytest
 from tests.tools.fuzz import PRESCRIBED, ROM_SCENE, SCENE, drawn, write_input
 from tests.tools.fuzz_runs import answer, patient, stuck
 from tests.tools.processes import ROOT, environment
+from tests.tools.tiers import cases, seeds
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.toml_input import validate
@@ -52,7 +53,7 @@ def faults(seed, count, capfd):
     return found
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6, fast=(0, 3)))
 def test_drawn_files(seed, folder, capfd):
     assert faults(seed, 50, capfd) == []
 
@@ -63,7 +64,7 @@ def test_many_drawn_files(seed, folder, capfd):
     assert faults(seed, 100, capfd) == []
 
 
-@pytest.mark.parametrize(("first", "count"), [(0, 60), pytest.param(10_000, 400, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("first", "count"), cases([(0, 20), (20, 40), (10_000, 400)], fast=[(0, 20)]))
 def test_damaged_files_of_every_format_and_command_lines(first, count):
     """In forks of a process of its own, whose end by a signal is a finding."""
     pytest.importorskip("meshlane")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.tools.tiers import cases
 from vanedamp.modal.frf import QUANTITIES, Frf, FrfError, identify
 from vanedamp.modal.rational_fit import Rational
 
@@ -86,24 +87,26 @@ def noise(rng, shape, kind):
     return values
 
 
+@pytest.mark.parametrize("draws", cases([24, 100], fast=[24]))
 @pytest.mark.parametrize(
     ("quantity", "lines", "responses", "count"),
     [("receptance", 16, 1, 1), ("accelerance", 801, 1, 1), ("mobility", 100, 3, 1), ("accelerance", 100, 1, 2)],
 )
-def test_noise_has_no_modes(quantity, lines, responses, count):
+def test_noise_has_no_modes(quantity, lines, responses, count, draws):
     """One in 10^4 may pass by the bound of `Rational.chance`: none of these 100, around zero or around a constant."""
     axis = np.linspace(2200.0, 2700.0, lines)
-    for seed in range(100):
+    for seed in range(draws):
         values = noise(np.random.default_rng(seed), (responses, lines), ["complex", "real", "hann"][seed % 3])
         with pytest.raises(FrfError, match="no mode of the band"):
             identify(Frf(axis, values + (100.0 if seed % 2 else 0.0), quantity), count)
 
 
+@pytest.mark.parametrize("draws", cases([60, 300], fast=[60]))
 @pytest.mark.parametrize(("kind", "responses"), [("real", 1), ("complex", 3)])
-def test_the_chance_of_noise_is_bounded(kind, responses):
-    """Of 300 noise responses no more fall below a bound than it says, within three standard deviations."""
+def test_the_chance_of_noise_is_bounded(kind, responses, draws):
+    """Of noise responses no more fall below a bound than it says, within three standard deviations."""
     s, chances = 1j * np.linspace(0.8, 1.0, 16), []
-    for seed in range(300):
+    for seed in range(draws):
         problem = Rational(s, noise(np.random.default_rng(seed), (responses, s.size), kind), 0)
         chances.append(problem.chance(problem.fit(problem.relocated(1))))
     for bound in (0.5, 0.1, 0.01):

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from tests.modal.test_lanczos import rod
 from tests.tools.small_structures import truss
+from tests.tools.tiers import cases
 from tests.tools.two_cubes_mesh import write_boxes
 from vanedamp.meshes.benchmarks import TaperedBlock, build
 from vanedamp.modal import davidson, fenicsx
@@ -47,8 +48,13 @@ def agree(matrices, count=10, multiples=1e-6):
     assert np.sum(np.where(near, shares, 0.0), axis=1)[~last] == pytest.approx(1.0, abs=1e-8)
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3])
-@pytest.mark.parametrize("held", HELD)
+@pytest.mark.parametrize(
+    ("held", "degree"),
+    cases(
+        [(held, degree) for held in HELD for degree in (1, 2, 3)],
+        fast=[("rollers", 1), ("free", 1), *((held, 2) for held in HELD), ("rollers", 3)],
+    ),
+)
 def test_modes_equal_those_by_factors(held, degree, tmp_path):
     """Multigrid on the vertices for degree 2 and 3; GAMG for degree 1, where rollers hold parts of nodes."""
     clamped, springs = HELD[held]
@@ -56,7 +62,7 @@ def test_modes_equal_those_by_factors(held, degree, tmp_path):
     agree(assemble(build(block, tmp_path / "plate.msh"), STEEL, clamped, degree, elastic=springs))
 
 
-@pytest.mark.parametrize("held", ["clamped", "rollers", "free"])
+@pytest.mark.parametrize("held", cases(["clamped", "rollers", "free"], fast=["rollers", "free"]))
 def test_matrices_of_which_the_vertices_are_unknown(held, tmp_path):
     clamped, _ = HELD[held]
     agree(replace(assemble(build(PLATE, tmp_path / "plate.msh"), STEEL, clamped), vertices=None))
@@ -68,8 +74,10 @@ def test_bricks_and_tetrahedra(hexahedra, tmp_path):
     agree(assemble(build(block, tmp_path / "beam.msh"), STEEL, {"root": "xyz"}))
 
 
-@pytest.mark.parametrize("vertices", [True, False])
-@pytest.mark.parametrize("ratio", [1e-4, 1e4])
+@pytest.mark.parametrize(
+    ("ratio", "vertices"),
+    cases([(1e-4, True), (1e-4, False), (1e4, True), (1e4, False)], fast=[(1e-4, True), (1e4, False)]),
+)
 def test_bonded_materials_of_very_different_stiffness(ratio, vertices, tmp_path):
     path = write_boxes(tmp_path / "boxes.msh", {"held": [1], "far": [2]}, {"left": [(0, 1, 1)]}, size=0.25)
     materials = {"held": Material(1.0, 0.3, 1.0), "far": Material(ratio, 0.3, 1.0)}
@@ -77,7 +85,7 @@ def test_bonded_materials_of_very_different_stiffness(ratio, vertices, tmp_path)
     agree(matrices if vertices else replace(matrices, vertices=None), 8)
 
 
-@pytest.mark.parametrize("count", [5, 20, 33])
+@pytest.mark.parametrize("count", cases([5, 20, 33], fast=[5, 33]))
 def test_no_copy_of_a_multiple_frequency_is_missed(count):
     """Twenty equal trusses side by side: every frequency is twentyfold."""
     one, copies = truss(seed=3, nodes=20), 20

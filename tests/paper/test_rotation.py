@@ -149,7 +149,7 @@ def test_there_is_no_resonance_for_a_track_little_below_its_order():
 
 @pytest.mark.parametrize("name", ["rotating_body", pytest.param("self_tuning", marks=pytest.mark.slow)])
 def test_claims_of_quick_studies(name, tmp_path, pictures):
-    found = study(name, PaperSession(STRUCTURE, tmp_path, effort=Effort(points=5)))
+    found = study(name, PaperSession(STRUCTURE, tmp_path, effort=Effort(points=3)))
     assert all(panel.x and panel.y for panel in pictures[name]) and any(panel.curves for panel in pictures[name])
     assert json.loads((tmp_path / f"{name}.claims.json").read_text())["study"] == name
     for claim in found.claims:
@@ -172,7 +172,8 @@ def test_beam_coefficients_are_above_the_exact_ones_and_close():
         assert third - second == pytest.approx(second - first, rel=1e-12)
 
 
-def test_study_of_the_blade(tmp_path, pictures):
+def test_study_of_the_blade(tmp_path, monkeypatch, pictures):
+    monkeypatch.setattr(study_of_blade, "_SPEEDS", 5)
     found = study_of_blade.blade()
     assert found.names == ("bending 1", "bending 2", "torsion 1", "edge bending 1", "bending 3")
     turns = found.revolutions

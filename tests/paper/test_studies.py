@@ -204,11 +204,14 @@ def test_verdicts():
     assert [verdict(True), verdict(False, True), verdict(False)] == ["shown", "partly", "not shown"]
 
 
+FEW = Effort(points=5, periods=430, transient=390)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Claims of figures with few frequencies and periods."""
     folder = tmp_path_factory.mktemp("paper")
-    session = PaperSession(STRUCTURE, folder, effort=Effort(points=9, periods=430, transient=390))
+    session = PaperSession(STRUCTURE, folder, effort=FEW)
     for name in ("fig9", "fig10", "fig19"):
         study(name, session)
     return folder
@@ -255,10 +258,15 @@ def test_claims_of_blocks_stand_beside_those_of_sliders(tmp_path, pictures):
     assert any("slider" in panel.curves for panel in panels)
 
 
-@pytest.mark.parametrize("name", ["fig10", "fig14", "fig19", "mistuning", "systems", "blocks", "fit"])
-def test_every_study_judges_and_draws_the_curves_of_its_scenes(name, tmp_path, monkeypatch, pictures):
-    """With one curve in the place of all others, in the numbers that its sweeps have."""
+@pytest.fixture(scope="module")
+def curve():
     (curve,) = damped("fig9", "", [0.96, 0.98, 0.9875, 1.0, 1.01], 600, 390, **{"cavity.c1.gap": [0.5 * AMPLITUDE]})
+    return curve
+
+
+@pytest.mark.parametrize("name", ["fig10", "fig14", "fig19", "mistuning", "systems", "blocks", "fit"])
+def test_every_study_judges_and_draws_the_curves_of_its_scenes(name, curve, tmp_path, monkeypatch, pictures):
+    """With one curve in the place of all others, in the numbers that its sweeps have."""
     of = STUDIES[name].args[0]
 
     def alike(file):
@@ -278,10 +286,10 @@ def test_every_study_judges_and_draws_the_curves_of_its_scenes(name, tmp_path, m
 
 
 def test_map_of_fit_and_friction(tmp_path, pictures):
-    found = study("fit", PaperSession(STRUCTURE, tmp_path, effort=Effort(points=5, periods=430, transient=390)))
+    found = study("fit", PaperSession(STRUCTURE, tmp_path, effort=replace(FEW, points=3)))
     *panels, bar = pictures["fit"]
     assert {panel.x for panel in panels} == {"coefficient of friction"} and "maximum without bodies, %" in bar.y
-    assert Sweep.load(tmp_path / "fit_map.h5").shape == (2, 5, 4, 5)
+    assert Sweep.load(tmp_path / "fit_map.h5").shape == (2, 5, 4, 3)
     least, most = (found.claims[0].figures[name] for name in ("least", "most"))
     assert 0 < least < most < 1
 
@@ -295,11 +303,10 @@ def test_points_that_failed_are_named():
 
 
 def test_resumed_session_takes_over_what_is_of_the_same_scene(folder, monkeypatch):
-    effort = Effort(points=9, periods=430, transient=390)
     monkeypatch.setattr(jobs_sweep, "sweep", None)
-    study("fig9", PaperSession(STRUCTURE, folder, effort=effort, resume=True))
+    study("fig9", PaperSession(STRUCTURE, folder, effort=FEW, resume=True))
     with pytest.raises(TypeError):  # another scene, and so another sweep
-        study("fig9", PaperSession(replace(STRUCTURE, amplitude=60e-6), folder, effort=effort, resume=True))
+        study("fig9", PaperSession(replace(STRUCTURE, amplitude=60e-6), folder, effort=FEW, resume=True))
 
 
 def test_confidence_goes_with_the_mean():

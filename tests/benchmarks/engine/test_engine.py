@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.engine import inside
 from benchmarks.engine import scenes as bench_scenes
 from benchmarks.engine.hand_written_loop import (
     ACCOUNT,
@@ -96,7 +97,8 @@ def test_more_modes_keep_the_first(tmp_path):
     np.testing.assert_allclose(ours.section, theirs.section, rtol=0, atol=1e-9 * bench_scenes.AMPLITUDE)
 
 
-def test_benchmark_leaves_its_results(tmp_path, capsys, pictures):
+def test_benchmark_leaves_its_results(tmp_path, capsys, monkeypatch, pictures):
+    monkeypatch.setattr(inside, "_REPEATS", 100)
     result = TINY.run(tmp_path / "bench")
     written = json.loads((tmp_path / "bench" / "bench_engine.json").read_text())
     assert written == json.loads(json.dumps(result))

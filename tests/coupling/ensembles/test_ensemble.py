@@ -44,7 +44,7 @@ def result():
 
 def test_indices_of_one_mode_at_resonance():
     force, ratio = (1.0, 3.0), (0.05, 0.2)
-    found = ensemble(scene(LINEAR, {"excitation.force": force, "structure.damping_ratio": ratio}, 256))
+    found = ensemble(scene(LINEAR, {"excitation.force": force, "structure.damping_ratio": ratio}, 64))
     # a product g(F) h(zeta) of independent numbers, with h = 1 / zeta
     mean, square = sum(force) / 2, (force[1] ** 3 - force[0] ** 3) / (force[1] - force[0]) / 3
     inverse, inverse_square = np.log(ratio[1] / ratio[0]) / (ratio[1] - ratio[0]), 1 / (ratio[0] * ratio[1])
@@ -61,7 +61,7 @@ def test_indices_of_one_mode_at_resonance():
 
 def test_quantiles_of_a_monotone_map():
     low, high = 0.05, 0.2
-    given = scene(LINEAR, {"structure.damping_ratio": (low, high)}, 256)
+    given = scene(LINEAR, {"structure.damping_ratio": (low, high)}, 128)
     found = ensemble(given).quantile["amplitude_mean"]
     ratios = 2.0 / (2 * STIFFNESS * found)
     np.testing.assert_allclose((high - ratios) / (high - low), QUANTILES, atol=1 / 128)

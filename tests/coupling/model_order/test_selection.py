@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from benchmarks.model_order.structures import beam_model
-from benchmarks.model_order.trial import LONG
 from tests.tools.input_files import DAMPED_BLOCK
 from tests.tools.small_structures import rod
 from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.model_order.confirmation import WORTH
 from vanedamp.coupling.model_order.selection import select_model_order, select_model_orders
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -22,12 +22,15 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.reduction import reduce
 from vanedamp.studies.cli import main
 
+#: fixed-interface modes of the rod; periods of a run for which a choice pays
+MODES, LONG = 24, WORTH + 1
+
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    """The rod in Craig-Bampton form with 40 modes."""
+    """The rod in Craig-Bampton form."""
     interface = Interface.on_patches(rod(100), [InterfaceCoordinate("tip", "tip", (1, 0, 0))])
-    model = reduce(rod(100, damping_ratio=0.01), interface, modes=40)
+    model = reduce(rod(100, damping_ratio=0.01), interface, modes=MODES)
     path = tmp_path_factory.mktemp("rod") / "rom.h5"
     model.save(path)
     return str(path)
@@ -136,7 +139,7 @@ def test_auto_chooses_and_says_so(file):
     )
     settled, estimate = select_model_order(made)
     assert settled.structure.natural
-    assert 1 < settled.structure.modes < 41
+    assert 1 < settled.structure.modes <= MODES
     assert estimate["modes"] == settled.structure.modes
     assert estimate["error"] <= 0.05
     assert estimate["sentence"].startswith(f"{settled.structure.modes} modes")
@@ -153,18 +156,18 @@ def test_auto_chooses_and_says_so(file):
 
 
 def test_few_periods_take_the_whole_model(file):
-    """A choice takes longer than such a run: all 41 coordinates, at once and with the reason; the answer is theirs."""
+    """A choice takes longer than such a run: all coordinates, at once and with the reason; the answer is theirs."""
     law = {"law": "compliant", "stiffness": 50.0}
     made = scene(file, contact=law, structure__modes="auto", damper__restitution=0.7)
     found = simulate(made)
-    assert found.estimate["modes"] == 41 and found.estimate["difference"] is None
-    assert "41 modes, the whole model, as 30 periods are run" in found.estimate["sentence"]
-    own = simulate(made.replace({"structure.modes": 41, "structure.natural": True}))
+    assert found.estimate["modes"] == MODES + 1 and found.estimate["difference"] is None
+    assert f"{MODES + 1} modes, the whole model, as 30 periods are run" in found.estimate["sentence"]
+    own = simulate(made.replace({"structure.modes": MODES + 1, "structure.natural": True}))
     np.testing.assert_array_equal(found.peak, own.peak)
     assert found.amplitude_mean == pytest.approx(simulate(made.replace({"structure.modes": None})).amplitude_mean)
     # contacts of a massless boundary need flexibility that a mode lacks
     massless = select_model_order(made.replace({"contact": {"law": "massless"}, "damper.0.restitution": 1.0}))
-    assert massless.estimate["modes"] == 40
+    assert massless.estimate["modes"] == MODES
 
 
 def two_masses(tmp_path, ratio, **changes):

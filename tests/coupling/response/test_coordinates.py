@@ -55,7 +55,7 @@ def test_coordinates_of_bodies_in_the_plane(tmp_path, method):
     block = {"shape": "block", "length": 0.02, "height": 0.01, "friction": 0.2, "restitution": 0.5}
     tables = {
         "cavity": [cavity], "damper": [{"cavity": "c1", "mass": 0.05, **block}],
-        "excitation": {"frequency": 31.0, "force": 150.0, "at": "a"},
+        "excitation": {"frequency": 31.0, "force": 150.0, "at": "a"}, "time": {"periods": 3, "transient": 1},
         "solver": {"method": method, **METHODS[method], "linearisation": 1.0},
     }  # fmt: skip
     response = simulate(scene(tmp_path, model, method, **tables), samples_per_period=8)

@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from tests.tools.tiers import cases
 from vanedamp.coupling.strength.counting import rainflow_cycles
 from vanedamp.coupling.strength.life import damage
 from vanedamp.coupling.strength.material import Fatigue
@@ -125,7 +126,7 @@ DEVIATIONS = {
 }
 
 
-@pytest.mark.parametrize("name", BANDS)
+@pytest.mark.parametrize("name", cases(BANDS, fast=["one wide band", "two bands"]))
 def test_narrow_band_and_dirlik_against_counted_histories(name):
     frequency, density = band_density(BANDS[name])
     curves = [Fatigue(**CURVE, exponent=b, after_knee="original") for b in (3.0, 5.0, 8.0)]

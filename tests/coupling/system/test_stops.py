@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.tools.laws_by_event import check_events
 from tests.tools.random_scenes import random_reduced, random_scene
+from tests.tools.tiers import seeds
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Initial
@@ -65,8 +66,9 @@ def test_one_impact_a_period_has_the_speed_of_its_closed_form():
     ],
 )  # fmt: skip
 def test_every_method_finds_the_orbit(solver, tolerance):
-    exact = simulate(oscillator(1.0))
-    response = simulate(oscillator(1.0, solver=solver))
+    time = {"periods": 140, "transient": 100}  # of the transient less than e^-31 is left
+    exact = simulate(oscillator(1.0, time=time))
+    response = simulate(oscillator(1.0, solver=solver, time=time))
     assert response.status is Status.OK
     assert response.impacts_per_period == 1.0
     assert response.amplitude_rms == pytest.approx(exact.amplitude_rms, rel=tolerance)
@@ -145,7 +147,7 @@ def test_two_points_that_meet_exchange_momentum(tmp_path):
 
 
 @pytest.mark.parametrize("structure", ["rigid", "rom"])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6, fast=(2, 3)))
 def test_laws_hold_event_by_event_beside_bodies(structure, seed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     if structure == "rom":

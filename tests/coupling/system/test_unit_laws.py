@@ -94,9 +94,11 @@ NAMED = {
 
 
 def product():
+    """The files of the product that may import the codes, as trees."""
     for folder in ("coupling", "studies", "rom", "modal", "files", "meshes"):
         for path in sorted((ROOT / folder).rglob("*.py")):
-            yield path.relative_to(ROOT).as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+            if "codes" in (text := path.read_text(encoding="utf-8")):
+                yield path.relative_to(ROOT).as_posix(), ast.parse(text)
 
 
 def named(tree):

@@ -1,8 +1,6 @@
 """Run-up and run-down: against independent integrations, Lewis' closed form, steady states and unbroken runs."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +12,7 @@ from tests.coupling.sweep.test_continuation import BISTABLE, DAMPING, EPS, RATIO
 from tests.coupling.system.test_loads import ring, travelling
 from tests.tools.chirp import chirp_response
 from tests.tools.processes import ROOT
+from tests.tools.tiers import cases
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.system.assembly import assemble
@@ -24,7 +23,7 @@ from vanedamp.coupling.transients.ramp_course import courses, ramped, scene_at
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.cli import main
+from vanedamp.studies.cli import BAD_INPUT, main
 
 MASS, RATIO, OMEGA, FORCE = 2.0, 0.005, 2 * np.pi * 100.0, 3.0
 ONE_MODE = {
@@ -132,7 +131,7 @@ def test_peaks_over_the_rate():
 # one mode
 
 
-@pytest.mark.parametrize("rate", [16.0, 64.0, -20.0])
+@pytest.mark.parametrize("rate", cases([16.0, 64.0, -20.0], fast=[64.0, -20.0]))
 def test_against_an_independent_integration(rate):
     ends = (90.0, 112.0) if rate > 0 else (112.0, 90.0)
     found = ramp(scene({"from": ends[0], "to": ends[1], "rate": abs(rate)}))
@@ -343,7 +342,7 @@ def test_hysteresis_over_the_jumps(periods, within):
 
 def test_run_up_of_a_rotor():
     """Engine order and centrifugal stiffness by DOP853; where the stiffness steps, it does work."""
-    given = scene({"quantity": "rpm", "from": 60.0, "to": 260.0, "rate": 10.0}, ROTOR)
+    given = scene({"quantity": "rpm", "from": 90.0, "to": 260.0, "rate": 16.0}, ROTOR)
     found = ramp(given)
     (run,) = found.runs
     assert run.frequency == pytest.approx(4.0 * run.speed / (2 * np.pi), rel=1e-14)
@@ -550,7 +549,7 @@ def test_a_run_that_ends_early_says_so():
 
 def test_a_start_that_is_not_steady_is_a_warning():
     data = ONE_MODE | {"time": {"periods": 20, "transient": 10}}
-    found = ramp(scene({**UP, "start": "steady"}, data))
+    found = ramp(scene({**UP, "to": 92.0, "start": "steady"}, data))
     assert "not_steady" in found.warnings[0]
 
 
@@ -606,15 +605,13 @@ def test_command_and_report(tmp_path, capsys):
     assert f"{runs[0]['peak_share']:.3f}" in page
 
 
-def test_bad_input_ends_with_one_line(tmp_path):
+def test_bad_input_ends_with_one_line(tmp_path, capsys):
     path = tmp_path / "scene.toml"
     path.write_text('[structure]\nmodel = "rigid"\nmass = 1.0\nstiffness = 1e4\ndamping_ratio = 0.01\n'
                     "[excitation]\nfrequency = 15.0\nforce = 1.0\n")  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, "-m", "vanedamp", "ramp", str(path)], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2 and done.stderr.count("\n") == 1
-    assert "ramp: missing" in done.stderr
+    assert main(["ramp", str(path)]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "ramp: missing" in said
 
 
 def test_interrupted_runs_resume_and_give_the_same_file(tmp_path):

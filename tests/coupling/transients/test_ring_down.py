@@ -266,7 +266,7 @@ def test_a_block_on_springs_against_an_independent_integration():
         return np.r_[rate, force / system.mass]
 
     turns = lambda t, y: y[len(q)]  # noqa: E731
-    options = {"rtol": 1e-12, "atol": 1e-16, "max_step": 1e-4, "events": turns}
+    options = {"rtol": 1e-12, "atol": 1e-16, "max_step": 4e-4, "events": turns}
     other = solve_ivp(motion, (0.0, found.duration), np.r_[q, v], "DOP853", **options)
     later = other.t_events[0] > 0.0  # the pull turns, too
     times, x = other.t_events[0][later], other.y_events[0][later, 0] * system.response[0]

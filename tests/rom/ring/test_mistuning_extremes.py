@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from tests.tools.rings import Chain
+from tests.tools.tiers import cases
 from vanedamp.modal.cyclic import aliased
 from vanedamp.rom.ring.deviations import Deviations, RingError
 from vanedamp.rom.ring.extremes import quantile, weibull
@@ -51,20 +52,22 @@ def test_worst_case_comes_near_the_bound(order):
     assert ratios[1] > 1.0 - 1e-4
 
 
-def test_no_draw_exceeds_the_bound():
+@pytest.mark.parametrize("draws", cases([18, 60], fast=[18]))
+def test_no_draw_exceeds_the_bound(draws):
     random = np.random.default_rng(0)
     largest = 0.0
-    for draw in range(60):
+    for draw in range(draws):
         chain = Chain(10, coupling=10 ** random.uniform(3.0, 5.0))
         values = 10 ** random.uniform(-3.0, -1.5) * random.standard_normal(10)
         largest = max(largest, factor(chain, draw % 6, Deviations(values)))
     assert 1.3 < largest < whitehead_bound(10)
 
 
-def test_weibull_fit_finds_its_distribution():
+@pytest.mark.parametrize("draws", cases([6, 20], fast=[6]))
+def test_weibull_fit_finds_its_distribution(draws):
     # by scipy.stats: the same law, 4 - x Weibull distributed
     law = stats.weibull_max(3.0, loc=4.0, scale=2.0)
-    fits = [weibull(law.rvs(400, random_state=seed), 8.0) for seed in range(20)]
+    fits = [weibull(law.rvs(400, random_state=seed), 8.0) for seed in range(draws)]
     assert np.mean([fit.quantile(0.99) for fit in fits]) == pytest.approx(law.ppf(0.99), rel=0.02)
     assert np.mean([fit.quantile(0.5) for fit in fits]) == pytest.approx(law.ppf(0.5), rel=0.02)
     best = fits[0]

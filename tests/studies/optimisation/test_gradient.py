@@ -96,7 +96,7 @@ def test_tolerances_to_first_order_agree_with_runs():
     for scale in (1.0, 0.5):
         widths = {"mass": 4e-3, "gap": 4e-3, "excitation": 4e-3, "restitution": 4e-3, "friction": 0.04}
         tolerances = {name: scale * width for name, width in widths.items()}
-        case = study(periods=1500, tolerances=tolerances, over_tolerances="mean", evaluations=5, gradient_steps=0)
+        case = study(periods=500, tolerances=tolerances, over_tolerances="mean", evaluations=5, gradient_steps=0)
         case = replace_variables(case, Design(0.09, 0.85, 1))
         record = optimise(case)
         estimate = record.nominal.estimate

@@ -45,8 +45,8 @@ def along_order(data):
     del data["excitation"]["frequency"]
     data["excitation"]["engine_order"] = 6.0
     del data["optimise"]["band"]
-    data["optimise"]["rpm"] = {"start": 24_300.0, "stop": 24_900.0, "num": 5}
-    data["optimise"]["map"] = {"mass_ratio": 2, "gap_ratio": 2}
+    data["optimise"]["rpm"] = {"start": 24_300.0, "stop": 24_900.0, "num": 3}
+    data["optimise"] |= {"map": {"mass_ratio": 2, "gap_ratio": 2}, "evaluations": 5, "samples": 1}
 
 
 @pytest.fixture(scope="module")
@@ -382,14 +382,14 @@ def test_the_best_damper_along_an_engine_order(tmp_path):
     crossing = np.sqrt(structure.stiffness / (structure.mass * 36.0 - 0.2))
     assert case.resonance.frequency == pytest.approx(6.0 * crossing / (2 * np.pi), rel=1e-5)
     assert case.amplitude == pytest.approx(3e-5) and case.reference == pytest.approx(3e-5, rel=1e-5)
-    assert case.frequencies == pytest.approx(np.linspace(2430.0, 2490.0, 5))
+    assert case.frequencies == pytest.approx(np.linspace(2430.0, 2490.0, 3))
     record = optimise(case)
     assert record.trouble == 0 and 0.0 < record.nominal.amplitude < 0.9
     design, base = record.nominal.design, case.with_bodies(record.nominal.design.bodies)
     point = case.point(design, dict.fromkeys(deviations(case)[0], 0.0), 2460.0)
     alone = simulate(base.replace(point))
     assert alone.frequency == pytest.approx(2460.0)
-    assert record.nominal_response[2] == pytest.approx(alone.amplitude_mean / record.reference, rel=1e-9)
+    assert record.nominal_response[1] == pytest.approx(alone.amplitude_mean / record.reference, rel=1e-9)
     assert record.headlines["nominal"]["undamped_peak_at"] == pytest.approx(case.resonance.frequency, rel=1e-5)
 
 

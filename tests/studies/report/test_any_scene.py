@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.tools.sensitive_scenes import KINDS, scene_of
+from tests.tools.tiers import cases
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.studies.cli import main
@@ -21,12 +22,20 @@ def shown(scene, folder):
     return (folder / "page.html").read_text()
 
 
-@pytest.mark.parametrize("seed", range(len(KINDS)), ids=KINDS)
-def test_runs_are_shown(seed, tmp_path, monkeypatch):
+def short(kind, folder):
+    return scene_of(KINDS.index(kind), folder)[1].replace({"time": {"periods": 30, "transient": 10}})
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_runs_are_shown(kind, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    short = scene_of(seed, tmp_path)[1].replace({"time": {"periods": 30, "transient": 10}})
-    for scene in (short, short.replace({"damper": [], "cavity": []})):
-        assert "Time history" in shown(scene, tmp_path)
+    assert "Time history" in shown(short(kind, tmp_path), tmp_path)
+
+
+@pytest.mark.parametrize("kind", cases(KINDS, fast=["prescribed", "jenkins", "stops", "reduced", "rotating"]))
+def test_runs_without_bodies_are_shown(kind, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "Time history" in shown(short(kind, tmp_path).replace({"damper": [], "cavity": []}), tmp_path)
 
 
 def test_a_run_under_noise_is_shown(tmp_path, monkeypatch):
