@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -35,16 +36,7 @@ def bifurcations(before: Point, after: Point) -> Iterator[Located]:
     if neutral != after.orbit.neutral:
         return
 
-    def tests(point: Point) -> Mapping[str, float]:
-        # neutral multipliers are as many as on the piece, since at its end one more may be 1; at a pitchfork one
-        # passes 1 while the parameter does not turn: the bordered derivative is singular (Keller 1977)
-        of, along = indicators(point.orbit.multipliers, neutral), float(point.tangent[-1])
-        return {
-            "fold": along, "period doubling": of.doubling, "neimark-sacker": of.torus,
-            "pitchfork": of.unity * float(np.sign(along)),
-        }  # fmt: skip
-
-    found = located(before, after, tests)
+    found = located(before, after, partial(_tests, neutral))
     length = abs(float((after.y - before.y) @ before.tangent))
     meeting = [at for at, kind, _ in found if kind == "pitchfork"]
     for at, kind, point in found:
@@ -55,6 +47,35 @@ def bifurcations(before: Point, after: Point) -> Iterator[Located]:
             note = "symmetry breaks" if with_symmetry(point.orbit).symmetric else "branches meet"
         if kind != "neimark-sacker" or _on_circle(point.orbit, neutral):
             yield Located(point, kind, note)
+
+
+def leaps(before: Point, after: Point) -> bool:
+    """Say whether a step between two orbits of one sequence leads from one sheet of a fold to the other.
+
+    A multiplier passes 1 then while the branch goes on the same way, but at no orbit between them.
+    """
+    neutral = before.orbit.neutral
+    if neutral != after.orbit.neutral:
+        return False
+
+    def meets(point: Point) -> Mapping[str, float]:
+        return {"pitchfork": _tests(neutral, point)["pitchfork"]}
+
+    low, high = meets(before)["pitchfork"], meets(after)["pitchfork"]
+    return low * high < 0.0 and not located(before, after, meets)
+
+
+def _tests(neutral: int, point: Point) -> dict[str, float]:
+    """Return the test functions of bifurcations at a point.
+
+    Neutral multipliers are as many as on the piece, since at its end one more may be 1. At a pitchfork one passes 1
+    while the parameter does not turn: the bordered derivative is singular (Keller 1977).
+    """
+    of, along = indicators(point.orbit.multipliers, neutral), float(point.tangent[-1])
+    return {
+        "fold": along, "period doubling": of.doubling, "neimark-sacker": of.torus,
+        "pitchfork": of.unity * float(np.sign(along)),
+    }  # fmt: skip
 
 
 def _on_circle(orbit: Orbit, neutral: int) -> bool:

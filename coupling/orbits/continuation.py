@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.derivatives.passage import change
-from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
+from vanedamp.coupling.orbits.bifurcations import Located, bifurcations, leaps
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
 from vanedamp.coupling.orbits.curve import Path, Point, beginning
 from vanedamp.coupling.orbits.newton import Orbit, with_symmetry
@@ -63,6 +63,9 @@ class Continuation(Path):
     def _end(self, why: str, point: Point) -> None:
         self._note(point, "end", why)
         super()._end(why, point)
+
+    def _leaps(self, before: Point, point: Point) -> bool:
+        return leaps(before, point)
 
     def _passed(self, before: Point, point: Point) -> Point | None:
         return None if self._ends_on(bifurcations(before, point)) else point

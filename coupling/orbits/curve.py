@@ -314,7 +314,7 @@ class Path:
                 failed = step
                 break
             cosine = float(point.tangent @ head.tangent)
-            if cosine > _BENT or step <= 2 * least:
+            if step <= 2 * least or (cosine > _BENT and not self._leaps(head, point)):
                 bend = float(np.linalg.norm(point.y - head.y - step * head.tangent))
                 quick = point.zero.iterations <= _EFFORT[point.given is not None][2] and cosine > _STRAIGHT
                 quick = quick and (not self.trail or bend <= _NEAR * step)
@@ -402,6 +402,10 @@ class Path:
     def _kept(self, point: Point) -> Any:
         """Return what is kept of a point."""
         raise NotImplementedError
+
+    def _leaps(self, before: Point, point: Point) -> bool:
+        """Say whether a point lies on another sheet than the one before it."""
+        return False
 
     def _passed(self, before: Point, point: Point) -> Point | None:
         """Note what is named on the way to a point. Returns the point to add: another where the path ends, or None."""
