@@ -9,15 +9,18 @@ from typing import Any
 from vanedamp.studies.commands.support.messages import print_note, print_warnings, write_result
 from vanedamp.studies.commands.support.scenes import print_resonance
 from vanedamp.studies.jobs.job import Job
-from vanedamp.studies.jobs.workers import available_cores, workers
 
 
 def run(arguments: Namespace, kind: type[Job], *inputs: Any) -> None:
     """Run the job of a command line on the input that the command has read. Raises VanedampError."""
     job = kind.of_arguments(arguments, *inputs)
     arguments.outputs.keep(job.files)
-    count = getattr(arguments, "workers", None)
-    job.check(count or available_cores())
+    count = 1
+    if job.PARALLEL:  # loads pools of processes
+        from vanedamp.studies.jobs.workers import available_cores, workers
+
+        count = getattr(arguments, "workers", None) or available_cores()
+    job.check(count)
     for note in job.notes():
         print_note(job.source, note)
     print_warnings(job.source, job.warnings())

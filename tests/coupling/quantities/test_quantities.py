@@ -26,7 +26,7 @@ from vanedamp.studies.explore.point_view import point_view
 from vanedamp.studies.identification.data import forced
 from vanedamp.studies.identification.fit import Fit
 from vanedamp.studies.identification.study import IdentificationStudy
-from vanedamp.studies.identification.tables import ForcedTable, Number
+from vanedamp.studies.identification.tables import ForcedTable, Sought
 from vanedamp.studies.life.study import LifeStudy
 from vanedamp.studies.optimisation.measures import Limits, check_measured
 from vanedamp.studies.report.page import write_report
@@ -161,7 +161,7 @@ def test_a_quantity_of_one_file_may_be_limited_and_is_on_the_page(jerk, tmp_path
 
 
 def test_a_quantity_of_one_file_may_be_measured_and_count_for_a_life(jerk):
-    places, numbers = [15.7, 15.9], {"excitation.resonance_amplitude": Number(5e-4, 2e-3)}
+    places, numbers = [15.7, 15.9], {"excitation.resonance_amplitude": Sought(5e-4, 2e-3)}
     given = scene(time=LONG, **RESTS)
     values = [getattr(vd.simulate(given.replace({"excitation.frequency": at})), jerk) for at in places]
     measured = forced("jerk", places, values, {}, ForcedTable("", noise=0.01, measure=jerk))
