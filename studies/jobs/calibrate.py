@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, ClassVar
 
 from vanedamp.studies.case.calibrated_files import save_rigid_scene, save_tuned_case
 from vanedamp.studies.case.calibration import Calibration, calibrate
-from vanedamp.studies.case.tables import Case
 from vanedamp.studies.headline import cavity_lines
 from vanedamp.studies.hot_spots import plus_minus
-from vanedamp.studies.jobs.job import Job, JobResult, Means, Write
+from vanedamp.studies.jobs.case import CaseJob
+from vanedamp.studies.jobs.job import JobResult, Means, Write
 
 
 @dataclass(frozen=True)
-class CalibrateJob(Job):
+class CalibrateJob(CaseJob):
     """Updates the model of a case, and finds damping, rigid model and excitation."""
 
-    case: Case
     TITLE: ClassVar[str] = "calibrate"
-
-    @property
-    def files(self) -> Iterable[str | Path]:
-        """The case's files."""
-        return self.case.files
 
     def work(self, means: Means) -> JobResult:
         """Calibrate."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,25 +10,19 @@ from typing import ClassVar
 
 from vanedamp.modal.records.campbell import Campbell
 from vanedamp.studies.case.stages import assemble, campbell_diagram, unit_doubts
-from vanedamp.studies.case.tables import Case
 from vanedamp.studies.headline import format_margin
-from vanedamp.studies.jobs.job import Job, JobResult, Means
+from vanedamp.studies.jobs.case import CaseJob
+from vanedamp.studies.jobs.job import JobResult, Means
 
 #: columns (modes) and rows (speeds) that are printed at most
 _MOST_COLUMNS, _MOST_ROWS = 12, 25
 
 
 @dataclass(frozen=True)
-class CampbellJob(Job):
+class CampbellJob(CaseJob):
     """Computes the diagram of a case."""
 
-    case: Case
     TITLE: ClassVar[str] = "campbell"
-
-    @property
-    def files(self) -> Iterable[str | Path]:
-        """The case's files."""
-        return self.case.files
 
     def work(self, means: Means) -> JobResult:
         """Compute it."""

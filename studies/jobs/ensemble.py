@@ -56,7 +56,7 @@ class EnsembleJob(SceneJob):
 
     def work(self, means: Means) -> JobResult:
         """Run all that is not done."""
-        resumed = self.finished(means.checkpoint)
+        resumed = means.finished
         result = ensemble(self.points, means.pool, means.report, means.checkpoint, means.provenance)
         new = [text for text in result.provenance.get("warnings", ()) if text not in self.points.grid.warnings]
         size = f"{self.points.size} points of {len(result.status)} samples"

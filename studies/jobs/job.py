@@ -40,13 +40,15 @@ class Means(NamedTuple):
     """Resources of a job.
 
     pool: worker processes, None: this process; report: called with the parts done and in total; checkpoint: a file to
-    which finished parts are written and from which the same job resumes, None: nowhere; provenance: of the result.
+    which finished parts are written and from which the same job resumes, None: nowhere; provenance: of the result;
+    finished: parts that the checkpoint has.
     """
 
     pool: Executor | None
     report: Callable[[int, int], None]
     checkpoint: Path | None
     provenance: dict[str, Any]
+    finished: int = 0
 
 
 @dataclass(frozen=True)
@@ -117,14 +119,14 @@ class Job(ABC):
         raise NotImplementedError
 
     @property
-    @abstractmethod
-    def files(self) -> Iterable[str | Path]:
-        """The files that the input names."""
-
-    @property
     def scene(self) -> Scene | None:
         """The scene that it runs; None without one."""
         return None
+
+    @property
+    def files(self) -> Iterable[str | Path]:
+        """The files that the input names, by default those of the scene."""
+        return () if self.scene is None else self.scene.files
 
     def check(self, workers: int) -> None:  # noqa: B027
         """Reject a job that takes too long or too much memory. Raises InputError."""
@@ -153,13 +155,16 @@ class Job(ABC):
         """Do it. Raises VanedampError."""
 
     def run(
-        self, pool: Callable[[], Executor | None] = lambda: None, checkpoint: Path | None = None, title: str = ""
-    ) -> tuple[JobResult, float]:
+        self, pool: Callable[[], Executor | None] = lambda: None, checkpoint: Path | None = None, title: str = "",
+        resumes: Callable[[int], object] = lambda finished: None,
+    ) -> tuple[JobResult, float]:  # fmt: skip
         """Compile the engine, and do the work with its progress shown. Returns the outcome and its time, s.
 
         pool: returns worker processes, which are slow to start; called when the checkpoint is known to fit the job.
+        resumes: called with the number of parts in the checkpoint, before the work.
         """
-        self.finished(checkpoint)
+        finished = self.finished(checkpoint)
+        resumes(finished)
         processes = pool() if self.PARALLEL else None
         started = time.perf_counter()
         if scenes := list(self.compiled()):
@@ -167,7 +172,7 @@ class Job(ABC):
 
             compile_engine(scenes, processes)
         with progress(title or self.TITLE) as report:
-            outcome = self.work(Means(processes, report, checkpoint, {"versions": versions()}))
+            outcome = self.work(Means(processes, report, checkpoint, {"versions": versions()}, finished))
         return outcome, time.perf_counter() - started
 
 
@@ -183,11 +188,6 @@ class SceneJob(Job):
     def scene(self) -> Scene:
         """The scene."""
         return self.of
-
-    @property
-    def files(self) -> Iterable[str | Path]:
-        """The scene's files."""
-        return self.of.files
 
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any], path: Path, **options: Any) -> Self:
@@ -217,11 +217,6 @@ class StudyJob(Job):
         """The study's scene."""
         scene: Scene = self.study.scene
         return scene
-
-    @property
-    def files(self) -> Iterable[str | Path]:
-        """The scene's files."""
-        return self.scene.files
 
     @classmethod
     def of_arguments(cls, arguments: Namespace, *inputs: Any) -> Job:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -19,8 +19,8 @@ from vanedamp.studies.case.ring_interference import ring_interference
 from vanedamp.studies.case.ring_stages import ring_analysis, ring_reduction
 from vanedamp.studies.case.stages import assemble, unit_doubts
 from vanedamp.studies.case.structure import Structure
-from vanedamp.studies.case.tables import Case
 from vanedamp.studies.headline import format_margin
+from vanedamp.studies.jobs.case import CaseJob
 from vanedamp.studies.jobs.job import Job, JobResult, Means, Write
 from vanedamp.studies.terminal import progress
 
@@ -31,14 +31,13 @@ _FAMILIES = 3
 
 
 @dataclass(frozen=True)
-class RingJob(Job):
+class RingJob(CaseJob):
     """Computes the modes of a case's ring, where engine orders meet them, and the amplification by its mistuning.
 
     operating: lowest and highest speed, rad/s; orders: engine orders; draws: of [mistuning]; family: from 1, around
     whose frequencies amplification counts.
     """
 
-    case: Case
     operating: tuple[float, float] | None = None
     orders: Sequence[int] | None = None
     draws: int = 100
@@ -55,11 +54,6 @@ class RingJob(Job):
         if arguments.mistuning and case.mistuning is None:
             raise InputError("--mistuning: the case has no table [mistuning], such as frequency = {std = 0.01}")
         return cls(arguments.input, case, operating, arguments.orders, arguments.draws, arguments.family)
-
-    @property
-    def files(self) -> Iterable[str | Path]:
-        """The case's files."""
-        return self.case.files
 
     def work(self, means: Means) -> JobResult:
         """Compute them. The checkpoint has the solutions over the speeds of [campbell]."""

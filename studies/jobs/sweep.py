@@ -105,7 +105,7 @@ class SweepJob(SceneJob):
 
     def work(self, means: Means) -> JobResult:
         """Run all unfinished points, and the point with the highest mean again."""
-        resumed, points = self.finished(means.checkpoint), self.points
+        resumed, points = means.finished, self.points
         provenance = means.provenance | dict(self.provenance)
         result = sweep(points, means.pool, means.report, means.checkpoint, provenance, self.moved_starts)
         responses = forced_responses(result)

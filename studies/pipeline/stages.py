@@ -110,13 +110,16 @@ class Stage(ABC):
         if tools.fresh:
             clear(checkpoint)
         tools.warn(job.warnings())
-        if finished := job.finished(checkpoint):
-            tools.note(f"{finished} points are done, the rest follows")
-        outcome, _ = job.run(tools.pool, checkpoint, self.name)
+
+        def resumes(finished: int) -> None:
+            if finished:
+                tools.note(f"{finished} points are done, the rest follows")
+
+        outcome, _ = job.run(tools.pool, checkpoint, self.name, resumes)
         for option, path in zip(self.OPTIONS, self.outputs, strict=False):
             if (write := outcome.writers.get(option)) is not None:
                 write(str(path))
-        outcome.clear(checkpoint)
+        replace(outcome, unfinished=False).clear(checkpoint)  # the stage is done
         tools.warn(outcome.warnings)
         for note in outcome.notes:
             tools.note(note)
