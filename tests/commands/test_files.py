@@ -283,13 +283,16 @@ def test_files_without_permission(folder):
 
 @pytest.mark.parametrize(
     ("package", "arguments", "remedy"),
-    [
-        ("dolfinx", ["modal", "case.toml"], "apt install python3-dolfinx"),
-        ("gmsh", ["mesh", "case.toml", "-o", "block.msh"], "pip install gmsh"),
-        ("matplotlib", ["report", "response.h5", "-o", "report.html"], "pip install matplotlib"),
-        ("plotly", ["report", "response.h5", "-o", "report.html"], "pip install plotly"),
-        ("h5py", ["run", "scene.toml", "-o", "response.h5"], "pip install h5py"),
-    ],
+    cases(
+        MISSING := [
+            ("dolfinx", ["modal", "case.toml"], "apt install python3-dolfinx"),
+            ("gmsh", ["mesh", "case.toml", "-o", "block.msh"], "pip install gmsh"),
+            ("matplotlib", ["report", "response.h5", "-o", "report.html"], "pip install matplotlib"),
+            ("plotly", ["report", "response.h5", "-o", "report.html"], "pip install plotly"),
+            ("h5py", ["run", "scene.toml", "-o", "response.h5"], "pip install h5py"),
+        ],
+        fast=MISSING[1::3],
+    ),
 )
 def test_missing_packages(package, arguments, remedy, folder):
     (folder / "empty" / package).mkdir(parents=True)
@@ -306,7 +309,7 @@ def test_missing_packages(package, arguments, remedy, folder):
 
 @pytest.mark.parametrize(
     ("package", "raised", "arguments", "line"),
-    [
+    cases(LACKING := [
         ("ufl", "ImportError('libX.so: cannot open')", ["modal", "case.toml"],
          "a library is installed, but cannot be loaded (libX.so: cannot open)"),
         ("mpi4py", "ImportError('libX.so: failed to map segment from shared object')", ["modal", "case.toml"],
@@ -318,7 +321,7 @@ def test_missing_packages(package, arguments, remedy, folder):
         ("h5py", "MemoryError()", ["run", "scene.toml", "-o", "response.h5"], "not enough memory (none left): free "),
         ("h5py", "RuntimeError(\"can't start new thread\")", ["run", "scene.toml", "-o", "response.h5"],
          "not enough memory (can't start new thread): free some, "),
-    ],
+    ], fast=LACKING[2:4]),
 )  # fmt: skip
 def test_libraries_that_do_not_load(package, raised, arguments, line, folder):
     (folder / "broken" / package).mkdir(parents=True)

@@ -48,8 +48,10 @@ def test_a_thousand_random_sweeps(first):
     assert [seed for seed in range(first, first + 100) if differing(seed)] == []
 
 
-@pytest.mark.parametrize("linked", [False, True], ids=["apart", "linked"])
-@pytest.mark.parametrize("orders", [(), (2,), (3, 5)], ids=["", "2", "3, 5"])
+@pytest.mark.parametrize(
+    ("orders", "linked"),
+    cases(itertools.product([(), (2,), (3, 5)], [False, True]), fast=[((2,), False), ((3, 5), True)]),
+)
 def test_no_frequency_reaches_the_next_points(orders, linked):
     """A task ends at a frequency at which a harmonic of the first scene would round to another order, or far beyond."""
     harmonics = [{"order": order, "amplitude": 0.3} for order in orders]

@@ -1,7 +1,6 @@
 """A bladed disk by one sector against the mesh of its whole ring: at rest, rotating, heated, under engine orders."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -137,7 +136,7 @@ def test_wave_with_gyroscopic_coupling_moves_the_whole_mesh(rotating):
 def test_campbell_diagram_by_nodal_diameter(rotating, gyroscopic):
     """Curves are the modes at every speed; at a crossing the whole mesh has the order's frequency."""
     sector, whole = rotating
-    speeds = np.linspace(1000.0, 3000.0, 5)
+    speeds = np.linspace(1000.0, 3000.0, 3)
     found = ring_campbell(of_ring(sector.standing), sector, speeds, [3, 5, 7, 10], 2, gyroscopic)
     assert found.error <= 1e-8 and not found.warnings
     for place, speed in enumerate(speeds):
@@ -263,16 +262,16 @@ def plate_errors(folder, size):
 
 def test_annular_plate_converges_to_kirchhoff(tmp_path):
     """From above, as the mesh is refined: nodal diameters 0 to 3, two families."""
-    errors = [plate_errors(tmp_path, size) for size in (0.0125, 0.00625, 0.0036)]
-    for coarse, fine in pairwise(errors):
-        assert np.all((fine > 0.0) & (fine < 0.65 * coarse))
-    assert errors[-1].max() < 2.2e-3
+    errors = [plate_errors(tmp_path, size) for size in (0.0125, 0.00625)]
+    assert np.all((errors[1] > 0.0) & (errors[1] < 0.65 * errors[0]))
+    assert errors[1].max() < 7e-3
 
 
 @pytest.mark.slow
 def test_annular_plate_on_a_fine_mesh(tmp_path):
     """To a thin plate's own error: solid elements have shear, and a clamp that is not quite rigid."""
-    assert np.abs(plate_errors(tmp_path, 0.0018)).max() < 1e-3
+    coarse, fine = (plate_errors(tmp_path, size) for size in (0.0036, 0.0018))
+    assert coarse.max() < 2.2e-3 and np.abs(fine).max() < 1e-3
 
 
 def test_curved_tetrahedra(tmp_path):

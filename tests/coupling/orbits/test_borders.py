@@ -11,6 +11,7 @@ from tests.reference.orbit_gap_oscillator import GapOscillator
 from tests.reference.orbit_impact_oscillator import ImpactOscillator
 from tests.tools import closed_maps as maps
 from tests.tools.closed_form_scenes import scene
+from tests.tools.tiers import cases
 from vanedamp.coupling.orbits.border_path import BorderPath
 from vanedamp.coupling.orbits.borders import first_point
 from vanedamp.coupling.orbits.branch import Branches
@@ -199,7 +200,7 @@ def test_impact_oscillator_folds_over_its_restitution_where_its_quadratic_equati
     assert border.multipliers[:, 0] == pytest.approx(np.ones(len(border.second)), abs=1e-7)
 
 
-@pytest.mark.parametrize("second", ["stop.0.restitution", "stop.0.gap"])
+@pytest.mark.parametrize("second", cases(["stop.0.restitution", "stop.0.gap"], fast=["stop.0.gap"]))
 def test_impact_oscillator_grazes_where_its_linear_response_reaches_the_stop(second):
     """Whatever the restitution, and in proportion to the gap."""
     own = {"stop.0.restitution": 0.5, "stop.0.gap": 1.0}[second]
@@ -270,7 +271,10 @@ def gapped(orbit, **table):
 
 @pytest.mark.parametrize(
     ("kind", "omega", "to", "gap"),
-    [("pitchfork", 0.98, 0.92, 18.0), ("neimark-sacker", 1.1, 1.17, 18.0), ("fold", 1.29, 1.36, 15.5)],
+    cases(
+        [("pitchfork", 0.98, 0.92, 18.0), ("neimark-sacker", 1.1, 1.17, 18.0), ("fold", 1.29, 1.36, 15.5)],
+        fast=[("pitchfork", 0.98, 0.92, 18.0), ("neimark-sacker", 1.1, 1.17, 18.0)],
+    ),
 )
 def test_symmetric_motion_loses_its_stability_over_the_gap_where_its_closed_form_does(kind, omega, to, gap):
     """A pitchfork, a torus, a fold; over the gap an impact passes the start of the period, too."""

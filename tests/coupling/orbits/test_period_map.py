@@ -11,7 +11,7 @@ from tests.reference.fixed_sequence import FixedSequence
 from tests.tools.closed_form_scenes import ball, period_one_start, rubbing, scene
 from tests.tools.random_scenes import random_compliant, random_jenkins, random_reduced, random_scene
 from tests.tools.sensitive_scenes import KINDS, numbers_of, scene_of
-from tests.tools.tiers import seeds
+from tests.tools.tiers import cases, seeds
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
@@ -114,7 +114,9 @@ def scaled(mapped, matrix):
     return matrix * mapped.scale / mapped.scale[:, None]
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", cases(SCENES, fast=SCENES.keys() - {"newton", "two cavities", "compliant, friction, lossless", "harmonics"})
+)
 def test_the_derivative_is_that_of_40_digits(name):
     mapped, state = passed(*SCENES[name])
     passage = mapped(state)
@@ -183,7 +185,10 @@ def drawn(kind, seed, folder):
     return made
 
 
-@pytest.mark.parametrize("kind", ["rigid", "prescribed", "rom", "compliant", "compliant rom", "jenkins"])
+@pytest.mark.parametrize(
+    "kind",
+    cases(["rigid", "prescribed", "rom", "compliant", "compliant rom", "jenkins"], fast=["rom", "compliant rom"]),
+)
 def test_the_derivative_is_that_of_differences_of_the_engine(kind, tmp_path):
     compared = 0
     for seed in range({"jenkins": 30, "rom": 5, "compliant rom": 5}.get(kind, 8)):

@@ -7,6 +7,7 @@ import pytest
 
 from tests.reference.comparison import follow
 from tests.tools.rings import Chain
+from tests.tools.tiers import cases
 from vanedamp.coupling.engine.line import sleeping
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.sector_response import BY_SECTOR, SectorResponse
@@ -80,10 +81,10 @@ def test_six_bodies_follow_an_independent_integrator(file, tmp_path, monkeypatch
 
 @pytest.mark.parametrize(
     ("sectors", "mass", "friction", "wave", "contact"),
-    [
+    cases(CROWDS := [
         (8, 0.3, 0.0, 3, {"law": "newton"}), (7, 0.1, 0.6, 1, {"law": "newton"}), (8, 0.01, 0.1, 2, {"law": "newton"}),
         (7, 0.05, 0.1, 2, {"law": "compliant", "stiffness": 1e6}),
-    ],
+    ], fast=CROWDS[::3]),
 )  # fmt: skip
 def test_sleeping_bodies_follow_an_independent_integrator(
     sectors, mass, friction, wave, contact, tmp_path, monkeypatch

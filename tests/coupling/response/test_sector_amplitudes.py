@@ -6,6 +6,7 @@ from scipy.optimize import minimize_scalar
 
 from tests.reference.integrator import integrate, quadrature
 from tests.tools.rings import Chain
+from tests.tools.tiers import cases
 from vanedamp.coupling.response.by_sector import response_by_sector
 from vanedamp.coupling.response.evaluation import Outcome
 from vanedamp.coupling.response.event_log import rows_of_line
@@ -64,12 +65,10 @@ def largest(x, times, values):
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {},
-        PULL,
-        {"contact": {"law": "poisson"}},
-        {**PULL, "contact": {"law": "poisson"}},
-    ],
+    cases(
+        [{}, PULL, {"contact": {"law": "poisson"}}, {**PULL, "contact": {"law": "poisson"}}],
+        fast=[PULL, {"contact": {"law": "poisson"}}],
+    ),
     ids=["sliders", "sliders pulled", "two phases", "two phases pulled"],
 )
 def test_amplitudes_of_sectors_are_those_of_an_independent_integrator(file, changes):

@@ -1,5 +1,6 @@
 """Damage from spectra: closed forms against quadrature in 40 digits, Dirlik against counted histories."""
 
+import itertools
 import math
 
 import mpmath
@@ -45,8 +46,13 @@ def quadrature(deviation, curve):
         return total / mpmath.mpf(curve.knee)
 
 
-@pytest.mark.parametrize("after", ["original", "haibach", "none", 12.5])
-@pytest.mark.parametrize("exponent", [3.0, 5.5, 12.0])
+@pytest.mark.parametrize(
+    ("exponent", "after"),
+    cases(
+        itertools.product([3.0, 5.5, 12.0], ["original", "haibach", "none", 12.5]),
+        fast=[(3.0, "original"), (5.5, "haibach"), (12.0, "none"), (5.5, 12.5)],
+    ),
+)
 def test_narrow_band_is_the_mean_over_rayleighs_density(exponent, after):
     curve = Fatigue(**CURVE, exponent=exponent, after_knee=after)
     expected = 3600.0 * 3.3e3 / (2.0 * math.pi) * float(quadrature(60e6, curve))
@@ -126,7 +132,7 @@ DEVIATIONS = {
 }
 
 
-@pytest.mark.parametrize("name", cases(BANDS, fast=["one wide band", "two bands"]))
+@pytest.mark.parametrize("name", cases(BANDS, fast=["two bands"]))
 def test_narrow_band_and_dirlik_against_counted_histories(name):
     frequency, density = band_density(BANDS[name])
     curves = [Fatigue(**CURVE, exponent=b, after_knee="original") for b in (3.0, 5.0, 8.0)]

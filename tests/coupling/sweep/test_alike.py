@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.tools.rings import Chain
+from tests.tools.tiers import cases
 from vanedamp.coupling.model_order.choices import NOTHING
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep import alike, worker
@@ -110,8 +111,11 @@ def _alone(monkeypatch, scene, points, task):
         return run_points(scene, NOTHING, points, task)
 
 
-@pytest.mark.parametrize("kept", [{}, {"sections": 50}], ids=["", "sections"])
-@pytest.mark.parametrize("linked", [False, True], ids=["apart", "linked"])
+@pytest.mark.parametrize(
+    ("linked", "kept"),
+    cases(ALONG := [(False, {}), (True, {}), (False, {"sections": 50}), (True, {"sections": 50})], fast=ALONG[1:3]),
+    ids=["apart", "linked", "apart-sections", "linked-sections"],
+)
 @pytest.mark.parametrize("name", _POINTS)
 def test_points_run_as_one_are_those_run_one_by_one(name, linked, kept, monkeypatch):
     tables, points = _POINTS[name]

@@ -14,6 +14,7 @@ from tests.studies.identification import oscillator
 from tests.studies.identification.oscillator import FREQUENCY, RATIO, STIFFNESS, half_swings, response, study
 from tests.studies.identification.test_fit import body
 from tests.studies.identification.test_study import write
+from tests.tools.tiers import cases
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
 from vanedamp.files.store import load
@@ -114,8 +115,8 @@ def test_a_wrong_model_is_seen_by_its_misfit():
     ("wrong", "noise", "said"),
     [
         (1e3, None, "divided by 1000 all amplitudes fit (mm and m?)"),
-        (np.sqrt(2.0), 0.02, "divided by 1.414 all amplitudes fit"),
-        (2.0, 0.02, "divided by 2 all amplitudes fit"),
+        pytest.param(np.sqrt(2.0), 0.02, "divided by 1.414 all amplitudes fit", marks=pytest.mark.slow),
+        pytest.param(2.0, 0.02, "divided by 2 all amplitudes fit", marks=pytest.mark.slow),
         (np.where(FREQUENCY == 15.3, 4.0, 1.0), None, "% of the values"),
     ],
 )  # fmt: skip
@@ -175,7 +176,7 @@ def test_commands(folder, capfd):
         assert f'id="identification-{chart}-0"' in page
 
 
-@pytest.mark.parametrize("workers", [None, 2])
+@pytest.mark.parametrize("workers", cases([None, 2], fast=[None]))
 def test_an_interrupted_search_resumes_bit_for_bit(found, tmp_path, workers):
     file, calls, stops = tmp_path / "f.h5.partial", [], [1, 8, 5]
 
@@ -213,7 +214,7 @@ def test_what_a_budget_leaves_is_written_and_gone_on_from(found, tmp_path):
     assert whole.best.tolist() == found[0].best.tolist() and whole.interval.tolist() == found[0].interval.tolist()
 
 
-@pytest.mark.parametrize("function", ["_minimum", "_profile", "_sensitivity"])
+@pytest.mark.parametrize("function", cases(["_minimum", "_profile", "_sensitivity"], fast=["_profile"]))
 def test_a_budget_that_ends_within_a_stage(found, monkeypatch, function):
     """The clock runs out as that stage begins."""
     late = []

@@ -26,7 +26,7 @@ def short(kind, folder):
     return scene_of(KINDS.index(kind), folder)[1].replace({"time": {"periods": 30, "transient": 10}})
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", cases(KINDS, fast=KINDS[::3]))
 def test_runs_are_shown(kind, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert "Time history" in shown(short(kind, tmp_path), tmp_path)

@@ -12,6 +12,7 @@ import pytest
 
 from tests.reference.comparison import follow
 from tests.tools.laws_by_event import check_events
+from tests.tools.tiers import cases
 from vanedamp.coupling.engine import known
 from vanedamp.coupling.engine.line import subsystems
 from vanedamp.coupling.engine.line.event_driven import EngineRun
@@ -164,7 +165,7 @@ def _first_impact(mpmath, case, near):
     return mpmath.findroot(lambda t: abs(x(t)) - half, mpmath.mpf(near))
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", cases(SCENES, fast=["row", "slope", "stuck", "compliant", "sliding", "table"]))
 def test_motion_and_laws(name, driven):
     """Events, motion and energies as by DOP853; forces, walls and Newton's law at every event; a closed ledger."""
     follow(SCENES[name], 8)
@@ -175,7 +176,7 @@ def test_motion_and_laws(name, driven):
     assert any(driven)
 
 
-@pytest.mark.parametrize(("spectrum", "count"), [("apart", 1), ("double", 2), ("close", 2)])
+@pytest.mark.parametrize(("spectrum", "count"), cases([("apart", 1), ("double", 2), ("close", 2)], fast=[("close", 2)]))
 def test_reduced_model(spectrum, count, driven, tmp_path):
     """One resonant mode of several, two of the same frequency, and two so close that both are driven."""
     case = on_model(tmp_path, reduced(spectrum))

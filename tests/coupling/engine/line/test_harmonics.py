@@ -14,6 +14,7 @@ from tests.reference.comparison import compare_motion, follow
 from tests.reference.integrator import with_horizon
 from tests.tools.closed_form_scenes import ball
 from tests.tools.random_scenes import random_reduced, random_scene
+from tests.tools.tiers import cases, seeds
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
@@ -185,7 +186,7 @@ def test_one_body_with_friction_follows_the_reference():
     assert response.counters["impacts"] >= 20
 
 
-@pytest.mark.parametrize("structure, seed", [("rigid", 1), ("rigid", 2), ("prescribed", 0)])
+@pytest.mark.parametrize("structure, seed", cases([("rigid", 1), ("rigid", 2), ("prescribed", 0)], fast=[("rigid", 1)]))
 def test_two_bodies_in_a_shared_cavity_follow_the_reference(structure, seed):
     """But for the energies: that of several impacts at once is more than the reference's ledger knows."""
     drawn = random_scene(seed, structure, 2, shared=True)
@@ -196,13 +197,13 @@ def test_two_bodies_in_a_shared_cavity_follow_the_reference(structure, seed):
     assert response.energy_residual < 1e-10
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", seeds(2, fast=[0]))
 def test_three_modes_follow_the_reference(tmp_path, seed):
     drawn = random_scene(seed, "rom", 2).replace({"excitation.harmonic": TWO})
     follow(drawn, 8, random_reduced(seed, 3), tmp_path)
 
 
-@pytest.mark.parametrize("restitutions", [(0.6,), (0.8, 0.7)])
+@pytest.mark.parametrize("restitutions", [pytest.param((0.6,), marks=pytest.mark.slow), (0.8, 0.7)])
 def test_solve_ivp_finds_the_same_impacts(restitutions):
     case = scene(TWO, periods=6, **bodies(*restitutions, friction=0.2))
     assert check(case) >= LEAST

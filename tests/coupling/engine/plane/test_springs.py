@@ -240,7 +240,7 @@ def test_brute_force_finds_the_same(body, restitution):
 
 
 @pytest.mark.parametrize("scenes", cases((3, 12), fast=[3]))
-@pytest.mark.parametrize("stiffness", [30.0, 1e3, 1e4])
+@pytest.mark.parametrize("stiffness", cases([30.0, 1e3, 1e4], fast=[1e3]))
 def test_laws(stiffness, scenes):
     worst, ends = laws_of(0, scenes, law={"law": "compliant", "stiffness": stiffness})
     assert sum(ends.values()) <= 1  # undecided: a body whose ringing has died out, and whose slip is round-off
