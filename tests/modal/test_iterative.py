@@ -62,7 +62,7 @@ def test_modes_equal_those_by_factors(held, degree, tmp_path):
     agree(assemble(build(block, tmp_path / "plate.msh"), STEEL, clamped, degree, elastic=springs))
 
 
-@pytest.mark.parametrize("held", cases(["clamped", "rollers", "free"], fast=["rollers", "free"]))
+@pytest.mark.parametrize("held", cases(["clamped", "rollers", "free"], fast=["rollers"]))
 def test_matrices_of_which_the_vertices_are_unknown(held, tmp_path):
     clamped, _ = HELD[held]
     agree(replace(assemble(build(PLATE, tmp_path / "plate.msh"), STEEL, clamped), vertices=None))

@@ -338,7 +338,7 @@ def test_shifts_of_arched_bands(arched, axis, speed):
     assert found - still == pytest.approx(expected, rel=1e-4)
 
 
-@pytest.mark.parametrize("axis", [AXIAL, OBLIQUE])
+@pytest.mark.parametrize("axis", [pytest.param(AXIAL, marks=pytest.mark.slow), OBLIQUE])
 def test_shifts_between_the_speeds_of_the_equilibria(arched, axis):
     """To 2e-3 of the shift of each of ten modes, and the told error is the largest one.
 

@@ -300,6 +300,7 @@ def lie_on(branch, both=False):
             assert stable == (np.abs(orbit.multipliers).max() < 1)
 
 
+@pytest.mark.slow
 def test_a_branch_loses_its_symmetry_and_wins_it_back_where_the_closed_form_does():
     """On the way an impact passes the start of the period, where the state jumps and the branch goes on."""
     begin = replace(GAP, omega=0.98)
@@ -312,6 +313,7 @@ def test_a_branch_loses_its_symmetry_and_wins_it_back_where_the_closed_form_does
     lie_on(branch)
 
 
+@pytest.mark.slow
 def test_a_branch_turns_where_two_symmetric_motions_meet():
     begin = replace(GAP, omega=1.13)
     branch = branch_of(gapped(begin), begin.state, **frequencies(1.13, 1.4))

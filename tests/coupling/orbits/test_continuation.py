@@ -143,6 +143,7 @@ def test_a_branch_that_nothing_continues_ends_at_the_place_and_says_so():
     assert branch.special[-1].kind == "end" and branch.special[-1].parameter == pytest.approx(0.3, rel=CLOSE)
 
 
+@pytest.mark.slow
 def test_grazing_of_the_impact_oscillator():
     """Its linear response reaches the stop at A = c."""
     (branch,) = diagram(maps.ImpactOscillator(), [0.0, 0.5], 0.05, 0.2, max_points=30).branches

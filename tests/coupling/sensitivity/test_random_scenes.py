@@ -7,12 +7,13 @@ import pytest
 
 from tests.tools.sensitive_scenes import KINDS
 from tests.tools.sensitivities import check
+from tests.tools.tiers import cases
 
 #: seeds of which a run or an orbit takes about a second, of every kind
 SEEDS = (0, 20, 439, 22, 4, 24, 424, 444, 8, 47, 428, 68, 430, 70, 432, 34, 111, 169, 113)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", cases(SEEDS, fast=SEEDS[::2]))
 def test_no_derivative_is_off(seed, tmp_path):
     found = check(seed, tmp_path)
     assert any(each.compared for each in found)
