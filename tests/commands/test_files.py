@@ -291,7 +291,7 @@ def test_files_without_permission(folder):
             ("plotly", ["report", "response.h5", "-o", "report.html"], "pip install plotly"),
             ("h5py", ["run", "scene.toml", "-o", "response.h5"], "pip install h5py"),
         ],
-        fast=MISSING[1::3],
+        fast=MISSING[::4],
     ),
 )
 def test_missing_packages(package, arguments, remedy, folder):
