@@ -34,6 +34,7 @@ KINDS = {
             ("deviations",),
             command="identify",
         ),
+        FileKind("design", "vanedamp.studies.design.tables:DesignFile", ("envelope", "requirements", "operation")),
         FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
         FileKind("study", "vanedamp.studies.optimisation.tables:StudyFile", ("optimise",), command="optimise"),
         FileKind("contact", "vanedamp.coupling.strength.contact_numbers:ContactFile", ("pair",)),

@@ -11,6 +11,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
+from vanedamp.studies.case.tables import Case
 from vanedamp.studies.demo.figure_file import FigureStructure
 from vanedamp.studies.hot_spots import plus_minus
 
@@ -30,6 +31,10 @@ Which body reduces a resonance most? `vanedamp optimise {file}` varies mass, gap
 _CASE_NOTE = """\
 The parametric vane cluster. `vanedamp modal {file}` computes its modes, `vanedamp reduce {file}` a model for scenes,
 `vanedamp check {file}` says what it means. SI units; every key: `vanedamp schema case`."""
+_DESIGN_NOTE = """\
+Which damper for a case, and does it hold? `vanedamp design {file}` finds mass and gap for each number of bodies, and
+confirms the best over everything that is uncertain; design.html in the folder is the answer. Measured frequencies and
+damping belong into the case ([calibration]). SI units; every key: `vanedamp schema design`."""
 _LEVEL_NOTE = """\
 resonance_amplitude: {level}."""
 _AT_STRENGTH = (
@@ -58,16 +63,18 @@ direction = "c1_left", normal = "c1_floor"."""
 Template = tuple[dict[str, Any], dict[str, str]]
 
 
-def template(kind: str, file: Path, rom: Path | None = None) -> Template:
-    """Return the first version of a file of a kind (scene, study or case), with its comments.
+def template(kind: str, file: Path, rom: Path | None = None, case: Path | None = None) -> Template:
+    """Return the first version of a file of a kind (scene, study, case or design), with its comments.
 
-    A scene is of the shipped rigid model, or of a reduced model (rom), a study is on the same scene. Raises InputError
-    for the reduced model's file, and for one with a case.
+    A scene is of the shipped rigid model, or of a reduced model (rom), a study is on the same scene, a design is for a
+    case. Raises InputError for the reduced model's file or the case, and for one that the kind does not take.
     """
-    if kind == "case":
+    if case is not None and kind != "design":
+        raise InputError("--case: is for a design")
+    if kind in ("case", "design"):
         if rom is not None:
             raise InputError("--rom: is for a scene or a study; a case is what a reduced model is made from")
-        return _case(file)
+        return _case(file) if kind == "case" else _design(file, case)
     data = _scene(file, rom, blocks=kind == "scene")
     if kind == "scene":
         return data, {"": _SCENE_NOTE.format(file=file.name)} | _notes(rom)
@@ -110,6 +117,30 @@ def _case(file: Path) -> Template:
     }  # fmt: skip
     notes = {"": _CASE_NOTE.format(file=file.name), "mesh": _MESH_NOTE, "interface.shroud": _INTERFACE_NOTE}
     return data, notes | {"interface.c1_floor": _CAVITY_NOTE}
+
+
+def _design(file: Path, case: Path | None) -> Template:
+    """Return a design for a case: an envelope about good dampers of the shipped cluster, and common requirements."""
+    shipped = FigureStructure.shipped()
+    ends = [_rounded(share * shipped.amplitude, 2) for share in (0.1, 2.0)]
+    data: dict[str, Any] = {
+        "case": "case.toml" if case is None else _beside(case, file.parent),
+        "folder": file.stem,
+        "operation": {"hours": 10_000.0},
+        "envelope": {
+            "bodies": [1, 2, 4], "mass": [_rounded(share * shipped.mass, 2) for share in (0.01, 0.04)], "gap": ends,
+            "gap_tolerance": 2e-6, "mass_tolerance": 0.03, "orientation_deg": [0.0, 90.0], "friction": [0.2, 0.6],
+            "restitution": [0.4, 0.8],
+        },
+        "requirements": {"amplitude_ratio": 0.5},
+    }  # fmt: skip
+    if case is not None:
+        found = Case.load(case)
+        floors = [label.removesuffix("_floor") for label in found.interface if label.endswith("_floor")]
+        data["envelope"] |= {"cavities": floors} if floors else {}
+        if found.fatigue_strength:
+            data["requirements"] |= {"utilisation": 1.0}
+    return data, {"": _DESIGN_NOTE.format(file=file.name)}
 
 
 def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:

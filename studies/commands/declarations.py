@@ -35,11 +35,15 @@ _RANGES = Function("support.scenes:read_scene_or_ranges")
 
 COMMANDS = (
     Command(
-        "new", "write a commented scene, case or study to start from", 2,
+        "new", "write a commented scene, case, study or design to start from", 2,
         (
-            argument("kind", metavar="KIND", choices=["scene", "case", "study"], help="scene, case or study"),
+            argument(
+                "kind", metavar="KIND", choices=["scene", "case", "study", "design"],
+                help="scene, case, study or design",
+            ),
             output_file("FILE.toml"),
             argument("--rom", metavar="ROM.h5", help="reduced model that a scene or study is to have"),
+            argument("--case", metavar="CASE.toml", help="case that a design is for (default: case.toml)"),
         ),
         writes=None,
     ),
@@ -289,6 +293,14 @@ COMMANDS = (
             argument("--dry-run", action="store_true", help="say what would run and why, and run nothing"),
         ),
         writes=None, takes=("pipeline",),
+    ),
+    Command(
+        "design", "one damper for a case: mass, gap, number of bodies, what it holds; redoes only what changed", 106,
+        (
+            input_file("STUDY.toml"), output_file("DIR"), json_file, workers,
+            argument("--dry-run", action="store_true", help="say what would run and why, and run nothing"),
+        ),
+        writes=None, takes=("design",),
     ),
     Command(
         "export", "a result in a file of another program: ParaView, MATLAB, test systems, Abaqus, Nastran, tables", 110,

@@ -23,7 +23,10 @@ def run(arguments: Namespace) -> None:
         check_outputs(arguments, beside=path.with_name(schema_name(kind)))
         if path.exists():
             raise InputError(f"--output {path}: exists already, and may be yours; name another file")
-    data, notes = template(kind, path, None if arguments.rom is None else Path(arguments.rom))
+    data, notes = template(
+        kind, path, None if arguments.rom is None else Path(arguments.rom),
+        None if arguments.case is None else Path(arguments.case),
+    )  # fmt: skip
     if output is None:
         print(commented(data, KINDS[kind].schema, kind, notes).split("\n", 2)[2], end="")
         print_note(f"new {kind}", f"nothing written; -o {path} writes the file, and beside it its schema for editors")

@@ -23,8 +23,8 @@ from vanedamp.studies.measure import Measure
 
 #: statuses of complete runs, whose results count; all but the first are reported
 _USABLE = (Status.OK, Status.NOT_STEADY, Status.UNCERTAIN, Status.TILTED)
-#: columns of a run before the rates of its contacts and their confidence
-_AMPLITUDE, _CONFIDENCE, _OK, _RATES = range(4)
+#: columns of a run before the damage per hour of its hot spots, the rates of its contacts and their confidence
+_AMPLITUDE, _CONFIDENCE, _OK, _DAMAGE = range(4)
 
 
 class BandMeans(NamedTuple):
@@ -32,7 +32,7 @@ class BandMeans(NamedTuple):
 
     rate, confidence: (c,) volumes of wear per hour, m^3/h, and half widths of their 95 % confidence intervals.
     amplitude, spread: (f,) measure relative to the reference, and half widths; nan where a run failed.
-    reduction, reduction_confidence: of the band, and half width.
+    reduction, reduction_confidence: of the band, and half width. damage: (s,) of the hot spots per hour, 1/h.
     """
 
     rate: np.ndarray
@@ -41,19 +41,21 @@ class BandMeans(NamedTuple):
     spread: np.ndarray
     reduction: float
     reduction_confidence: float
+    damage: np.ndarray
 
 
-def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[WearContact]]:
+def run_point(scene: Scene, measure: Measure, spots: int) -> tuple[np.ndarray, list[WearContact]]:
     """Return the row of a run and its contacts, in a worker; nan and no contacts where it failed.
 
-    The relative confidence of the measure is taken to be that of the mean amplitude.
+    spots: number of hot spots whose damage counts. The relative confidence of the measure is taken to be that of the
+    mean amplitude.
     """
     try:
         response = simulate(scene)
     except OF_A_POINT as error:
         if isinstance(error, InputError):
             raise
-        return np.array([np.nan, np.nan, 0.0]), []
+        return np.r_[np.nan, np.nan, 0.0, np.full(spots, np.nan)], []
     wear = response.wear or ()
     contacts = [
         WearContact(item.damper, item.side, item.corner, np.nan if item.area is None else item.area, item.share)
@@ -65,8 +67,9 @@ def run_point(scene: Scene, measure: Measure) -> tuple[np.ndarray, list[WearCont
         confidence *= value / max(response.amplitude_mean, np.finfo(float).tiny)
     measured = [value, confidence]
     rates = [item.volume_rate for item in wear], [_or(item.volume_rate_confidence, 0.0) for item in wear]
-    row = np.array([*measured, float(response.status == Status.OK), *rates[0], *rates[1]])
-    return np.where(usable, row, np.r_[np.nan, np.nan, 0.0, np.full(2 * len(wear), np.nan)]), contacts
+    damage = response.damage_per_hour if spots else ()
+    row = np.array([*measured, float(response.status == Status.OK), *damage, *rates[0], *rates[1]])
+    return np.where(usable, row, np.r_[np.nan, np.nan, 0.0, np.full(len(row) - _DAMAGE, np.nan)]), contacts
 
 
 def _or(value: float | None, default: float) -> float:
@@ -104,7 +107,7 @@ class LifeRuns(SceneCheckpoint):
         if self.study.refines:
             more, beyond = self._refined(scene, rows)
             rows = rows + more
-        width = _RATES + 2 * len(self.contacts)
+        width = _DAMAGE + len(self.study.spots) + 2 * len(self.contacts)
         padded = np.array([np.r_[row[:width], np.full(width - min(len(row), width), np.nan)] for row in rows])
         self.trouble += int(np.count_nonzero(padded[:, _OK] != 1.0))
         return self._means(padded, band, beyond)
@@ -149,17 +152,17 @@ class LifeRuns(SceneCheckpoint):
         return {"runs": Variable(rows, ("run", "column"))}, {"contacts": contacts}, f"{len(rows)} runs are finished"
 
     def _run(self, points: Sequence[Scene]) -> Any:
-        measures = [self.study.measure] * len(points)
+        common = [self.study.measure] * len(points), [len(self.study.spots)] * len(points)
         if self._executor is None:
-            return map(run_point, points, measures)
-        return _handed_out(self._executor, points, measures)
+            return map(run_point, points, *common)
+        return _handed_out(self._executor, points, *common)
 
     def _means(self, rows: np.ndarray, band: int, beyond: float) -> BandMeans:
         """Return the means of rows (k, columns), those of the band first.
 
         beyond: estimate by which the maximum may be higher, m.
         """
-        table, c = self.study.table, len(self.contacts)
+        table, c, first = self.study.table, len(self.contacts), _DAMAGE + len(self.study.spots)
         ok = np.isfinite(rows[:, _AMPLITUDE])
         amplitude, spread = rows[:, _AMPLITUDE] / self.study.reference, rows[:, _CONFIDENCE] / self.study.reference
         # failed runs are left out; if all have failed, there is no damping
@@ -172,7 +175,7 @@ class LifeRuns(SceneCheckpoint):
             weights = np.r_[table.dwell, np.zeros(len(rows) - band)]
         weights = weights * ok
         weights = weights / max(weights.sum(), np.finfo(float).tiny)
-        rates = np.where(ok[:, None], rows[:, _RATES:], 0.0)
+        rates, damage = (np.where(ok[:, None], part, 0.0) for part in (rows[:, first:], rows[:, _DAMAGE:first]))
         in_band, half = counted[:band], np.where(ok, spread, 0.0)
         reduction, confidence = 1.0 - float(counted[highest]), float(half[highest]) + beyond / self.study.reference
         if table.over_band == "mean":
@@ -180,7 +183,7 @@ class LifeRuns(SceneCheckpoint):
             confidence = float(np.sqrt((half[:band] ** 2).sum()) / max(ok[:band].sum(), 1))
         return BandMeans(
             weights @ rates[:, :c], np.sqrt(weights**2 @ rates[:, c:] ** 2), amplitude[:band], spread[:band],
-            reduction, confidence,
+            reduction, confidence, weights @ damage,
         )  # fmt: skip
 
 
@@ -189,8 +192,8 @@ def _height(row: np.ndarray) -> float:
     return float(row[_AMPLITUDE]) if np.isfinite(row[_AMPLITUDE]) else -np.inf
 
 
-def _handed_out(executor: Executor, points: Sequence[Scene], measures: Sequence[Measure]) -> Any:
+def _handed_out(executor: Executor, *arguments: Sequence[Any]) -> Any:
     try:
-        yield from executor.map(run_point, points, measures)
+        yield from executor.map(run_point, *arguments)
     except BrokenExecutor as error:
         raise SweepError(f"the workers are gone ({error}); run the same again to go on from the checkpoint") from error

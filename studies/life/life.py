@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError, tables
@@ -209,6 +210,9 @@ def _record(
     }  # fmt: skip
     late = np.divide(shift, gap_rate, out=np.zeros_like(shift), where=gap_rate > 0.0).max(axis=1)
     hours = _hours(values["time"], values["reduction"], values["reduction_band"], late, study.threshold)
+    if study.spots:
+        values["damage_rate"] = np.array([moment.found.damage for moment in moments])
+        values["damage"] = cumulative_trapezoid(values["damage_rate"], values["time"], axis=0, initial=0.0)
     last = moments[-1]
     early_end = last.time < study.table.hours * (1.0 - 1e-12) and not hours[0]
     thin = bool(np.any(wearing.lost(last.state) >= 1.0 - _LEFT))
@@ -219,7 +223,8 @@ def _record(
         **{name: frozen(array) for name, array in values.items()},
         hours=hours, runs=runs.asked, trouble=runs.trouble,
         sentence=sentence_of(hours, study, values, starts, worn), starts=starts,
-        worn_away=None if worn is None else worn[0], provenance=provenance,
+        worn_away=None if worn is None else worn[0], hot_spots=study.spots,
+        vane_hours=_failed(values["time"], values["damage"]) if study.spots else None, provenance=provenance,
     )  # fmt: skip
 
 
@@ -234,6 +239,12 @@ def _hours(
     if early is not None:
         early = max(early - float(np.interp(early, time, late)), 0.0)
     return lost, early, None if last is None else last + float(np.interp(last, time, late))
+
+
+def _failed(time: np.ndarray, damage: np.ndarray) -> float | None:
+    """Return when the damage (n, s) of a hot spot reaches 1, h; None: not within the hours."""
+    most = damage.max(axis=1)
+    return float(np.interp(1.0, most, time)) if most[-1] >= 1.0 else None
 
 
 def _lost(time: np.ndarray, above: np.ndarray) -> float | None:

@@ -64,6 +64,14 @@ class LifeRecord(Record):
     """of the runs, those with another status than ok"""
     sentence: str
     """the answer in words"""
+    hot_spots: tuple[str, ...] = ()
+    """of the vane, whose damage counts"""
+    damage_rate: Annotated[np.ndarray | None, Array(("time", "hot_spot"), "1/h")] = None
+    """damage of each hot spot per hour, weighted over the band by the time spent there"""
+    damage: Annotated[np.ndarray | None, Array(("time", "hot_spot"))] = None
+    """damage since the beginning, by Miner's rule; 1: half of the vanes have failed"""
+    vane_hours: float | None = None
+    """median life of the vane while the damper wears; None: longer than the hours [h]"""
     starts: Mapping[str, Any] = field(default_factory=dict)
     """worst of the damper over starts (worst_start.worst_start), as new ("new") and at the end ("end")"""
     worn_away: float | None = None
@@ -72,7 +80,9 @@ class LifeRecord(Record):
 
     def labels(self) -> dict[str, Any]:
         """Return the names of the contacts."""
-        return {"contact": [contact.name for contact in self.contacts]}
+        return {"contact": [contact.name for contact in self.contacts]} | (
+            {"hot_spot": list(self.hot_spots)} if self.hot_spots else {}
+        )
 
     def derived(self) -> dict[str, Any]:
         """Return the contacts by the names of their parts."""

@@ -19,6 +19,7 @@ from vanedamp.coupling.response.wear import ALONG, body_shares, body_volumes, op
 from vanedamp.coupling.scene.paths import Range
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed
+from vanedamp.coupling.strength.spots import spots_of
 from vanedamp.coupling.sweep.grid import Points
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.key_tables import documented
@@ -100,6 +101,7 @@ class LifeStudy(NamedTuple):
     """A scene, its [life] table, and the reference of its curves.
 
     frequencies: (f,) Hz of the band. reference: amplitude without bodies in the band, m, or the limit of what counts.
+    spots: names of the hot spots whose damage counts, if all have a curve of stress and life.
     """
 
     scene: Scene
@@ -107,6 +109,7 @@ class LifeStudy(NamedTuple):
     frequencies: np.ndarray
     reference: float
     measure: Measure
+    spots: tuple[str, ...] = ()
 
     @classmethod
     def load(cls, path: str | Path) -> LifeStudy:
@@ -128,7 +131,7 @@ class LifeStudy(NamedTuple):
             raise InputError(f"{path}: {error}") from None
         if reference == 0.0:
             raise InputError(f"{path}: excitation: name force or resonance_amplitude, the level that is to be damped")
-        return cls(scene, file.life, frozen(band), reference, measure)
+        return cls(scene, file.life, frozen(band), reference, measure, _damaged(scene))
 
     @property
     def threshold(self) -> float:
@@ -221,6 +224,13 @@ class WearEffect(NamedTuple):
             if np.isfinite(lost):
                 changes[f"damper.{number}.mass"] = damper.mass * (1.0 - float(lost))
         return self.scene.replace(changes)
+
+
+def _damaged(scene: Scene) -> tuple[str, ...]:
+    """Return the hot spots of a scene's model; none where one of them has no curve of stress and life."""
+    spots = spots_of(scene)
+    known = spots is not None and all(one is not None and one.exponent is not None for one in spots.materials)
+    return tuple(spots.facts) if spots is not None and known else ()
 
 
 def _check(scene: Scene) -> None:

@@ -73,19 +73,26 @@ def pipeline(
     every core; dry_run: name what would run; note: prints a line as stages begin and end. Raises InputError, with
     the stage's file: nothing has run then if the file, the case or a scene is bad, or would take a month.
     """
-    started = time.perf_counter()
     table, source = PipelineFile.load(path), Path(path)
     target = Path(folder) if folder is not None else source.parent / table.folder
     if target.exists() and not target.is_dir():
         raise InputError(f"{path}: folder: {target} is a file; name a folder for the results")
     listed = list(stages(table, source, target))
-    say = note or (lambda line: None)
-    _check(listed, [source, *table.named_files.values()], source, workers or available_cores())
-    record = PipelineRecord(target / f"{source.stem}.record.json")
+    return run_stages(listed, source, [*table.named_files.values()], target, workers, dry_run, note)
+
+
+def run_stages(
+    listed: Sequence[Stage], source: Path, files: Sequence[str], folder: Path, workers: int | None, dry_run: bool,
+    note: Callable[[str], None] | None,
+) -> PipelineResult:  # fmt: skip
+    """Run the stages of a file whose inputs have changed, as `pipeline` says; files: those that it names."""
+    started, say = time.perf_counter(), note or (lambda line: None)
+    _check(listed, [source, *files], source, workers or available_cores())
+    record = PipelineRecord(folder / f"{source.stem}.record.json")
     _keep_edited(listed, record)
     if dry_run:
         return PipelineResult(tuple(_plan(listed, record, say)), time.perf_counter() - started)
-    target.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     results = []
     with ExitStack() as stack:
         pool = cache(lambda: stack.enter_context(worker_processes(workers)))
@@ -93,7 +100,7 @@ def pipeline(
             with _located(stage):
                 results.append(_done(stage, record, say, pool))
     result = PipelineResult(tuple(results), time.perf_counter() - started)
-    say(f"{path}: {len(result.done)} of {len(listed)} stages ran, {result.wall_time_s:.1f} s")
+    say(f"{source}: {len(result.done)} of {len(listed)} stages ran, {result.wall_time_s:.1f} s")
     return result
 
 

@@ -150,7 +150,7 @@ class CaseStage(Stage):
             case, measured = replace(case, calibration=None), tables.pop("calibration", {})
             calibration = {key: measured[key] for key in self.CALIBRATION_KEYS if key in measured}
             tables |= {"calibration": calibration} if self.CALIBRATION_KEYS else {}
-        return {f"case {self.file.name}": tables} | _digests(case.files, self.file.parent) | _software(*_DOLFINX)
+        return {f"case {self.file.name}": tables} | digests(case.files, self.file.parent) | software(*_DOLFINX)
 
 
 @dataclass(frozen=True)
@@ -193,6 +193,9 @@ class Modal(CaseStage):
 class Reduce(CaseStage):
     """From a case to its reduced model."""
 
+    #: whether the model keeps the amplitude at the case's fatigue strength
+    LEVEL: ClassVar[bool] = False
+
     table: ReduceStage
 
     def _checked(self) -> Case:
@@ -205,7 +208,8 @@ class Reduce(CaseStage):
 
         Only a model with hot spots depends on strengths.
         """
-        return _without_level(super().inputs(), self.table.hot_spots > 0) | {"option": asdict(self.table)}
+        case = super().inputs() if self.LEVEL else _without_level(super().inputs(), self.table.hot_spots > 0)
+        return case | {"option": asdict(self.table)}
 
     def work(self, tools: Tools) -> str:
         """Reduce."""
@@ -214,7 +218,7 @@ class Reduce(CaseStage):
         table, structure = self.table, assemble(Case.load(self.file))
         modes = None if table.modes == "auto" else table.modes
         model = reduction(
-            structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots, level=False
+            structure, modes, table.basis, table.tolerance, table.max_frequency, table.hot_spots, level=self.LEVEL
         )
         model.save(self.outputs[0])
         tools.warn(reduction_warnings(structure, model))
@@ -251,7 +255,7 @@ class Identify(Stage):
         scene, *measured = self._named()
         files: list[str | Path] = [*measured, *Scene.load(scene).files]
         of = {f"study {self.file.name}": read_toml(self.file), f"scene {scene.name}": read_toml(scene)}
-        return of | _digests(files, self.file.parent) | _software()
+        return of | digests(files, self.file.parent) | software()
 
     def work(self, tools: Tools) -> str:
         """Identify."""
@@ -297,7 +301,7 @@ class OnScene(Stage):
             changes["fatigue level"] = {"amplitude": amplitude}
         there = (rigid or self.table.structure != "rigid") and (amplitude is not None or self.table.level is None)
         files = self._class().FILE.of(self._tables(rigid, amplitude), self.file).files if there else []
-        return {f"scene {self.file.name}": tables} | changes | _digests(files, self.file.parent) | _software()
+        return {f"scene {self.file.name}": tables} | changes | digests(files, self.file.parent) | software()
 
     def work(self, tools: Tools) -> str:
         """Run it."""
@@ -372,7 +376,7 @@ class Report(Stage):
 
     def inputs(self) -> dict[str, Any]:
         """Return all results."""
-        return _digests([*self.takes, *self.results], self.file.parent) | {"title": self.title} | _software()
+        return digests([*self.takes, *self.results], self.file.parent) | {"title": self.title} | software()
 
     def work(self, tools: Tools) -> str:
         """Write the page."""
@@ -454,12 +458,12 @@ def _on_scene(
     return OnScene(f"{kind} {table.stem}", scene, files, tuple(takes), kind, table, products)
 
 
-def _digests(files: Iterable[str | Path], folder: Path) -> dict[str, str]:
+def digests(files: Iterable[str | Path], folder: Path) -> dict[str, str]:
     """Return the digests of existing files, by their paths relative to a folder."""
     return {f"file {os.path.relpath(file, folder)}": digest(file) for file in files if Path(file).is_file()}
 
 
-def _software(*packages: str) -> dict[str, Any]:
+def software(*packages: str) -> dict[str, Any]:
     """Return the versions of the software that the numbers of a stage depend on."""
     installed = versions()
     for package in packages:

@@ -1,0 +1,212 @@
+"""Scenes of devices on the reduced model of a case: levels of the model hierarchy, studies of searches and of lives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.linear_response import linear_peaks
+from vanedamp.coupling.system.resonance import chosen_resonance
+from vanedamp.coupling.system.transient import settled_after
+from vanedamp.files.toml_input import InputError, plain, tables
+from vanedamp.rom.reduced import ReducedModel
+from vanedamp.studies.design.tables import DesignFile
+from vanedamp.studies.templates import template
+
+#: ends of the default band over the resonances with the heaviest bodies fixed and without bodies, and points per width
+_BAND, _PER_WIDTH = (0.985, 1.01), 1.5
+_FEWEST, _MOST = 15, 60
+#: damping ratio by which the band is spaced where the model has none
+_DAMPING = 1e-3
+#: periods that are evaluated, and longest transient
+_EVALUATED, _LONGEST = 200, 100_000
+#: file of the model without hot spots, in the folder of the model
+PLAIN = "rom_plain.h5"
+#: levels of the model hierarchy below the whole model, by natural modes
+LEVELS = (1, 3)
+#: paths of what is uncertain of a device
+UNCERTAIN = {
+    "friction": "damper.friction", "restitution": "damper.restitution", "orientation_deg": "gravity.orientation_deg",
+    "gap": "cavity.gap", "mass": "damper.mass",
+}  # fmt: skip
+
+
+class Device(NamedTuple):
+    """Number of bodies, mass of each, kg, and gap, m."""
+
+    bodies: int
+    mass: float
+    gap: float
+
+
+class Devices:
+    """The devices of a study on its reduced model.
+
+    scene: any of them, in the middle of what is uncertain, on the cheapest level; frequencies: (f,) Hz of the band;
+    amplitude: m, of the resonance without bodies; mass: kg, modal.
+    """
+
+    def __init__(self, study: DesignFile, rom: Path, source: str) -> None:
+        """Take a study, and the file of the case's reduced model. source: the study's file, which errors name.
+
+        Raises InputError for an envelope that does not fit the model.
+        """
+        self.study, self.rom, self.source = study, rom, source
+        self._model = ReducedModel.load(rom)
+        data, _ = template("study", rom.parent / "study.toml", rom)
+        self._data = {name: data[name] for name in ("structure", "excitation", "contact", "gravity")}
+        self._data["structure"]["file"] = str(rom)
+        self.cavities = self._chosen(data["cavity"])
+        if study.contact is not None:
+            self._data["contact"] = plain(tables(study.contact))
+        if study.wear is not None:
+            self._data["wear"] = plain(tables(study.wear))
+        self._set_level(study)
+        envelope = study.envelope
+        middle = Device(envelope.bodies[0], envelope.mass[1] / envelope.bodies[0], envelope.gap[0])
+        self._time = {"periods": 2, "transient": 1}
+        scene = self.at(middle, LEVELS[0])
+        resonance = chosen_resonance(scene)
+        self.frequency, self.mass = resonance.frequency, resonance.mass
+        self._data["excitation"]["resonance_near"] = [resonance.frequency] * 2
+        self.frequencies = self._band()
+        self._data["excitation"]["frequency"] = float(self.frequencies[0])
+        dropped = max(
+            settled_after(scene.replace({"excitation.frequency": float(end)}), range(1, _LONGEST))
+            for end in self.frequencies[[0, -1]]
+        )
+        self._time = {"periods": dropped + _EVALUATED, "transient": dropped}
+        self.scene = self.at(middle, LEVELS[0])
+        self.amplitude = float(linear_peaks(self.scene, *map(float, self.frequencies[[0, -1]]))[0].amplitude)
+
+    def _chosen(self, cavities: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Return the cavities that may hold bodies, without their gaps."""
+        known = {cavity["name"]: {key: cavity[key] for key in cavity if key != "gap"} for cavity in cavities}
+        for name in self.study.envelope.cavities:
+            if name not in known:
+                raise InputError(
+                    f"{self.source}: envelope.cavities: no cavity '{name}'; the case has {', '.join(known)}"
+                )
+        return [known[name] for name in self.study.envelope.cavities or known]
+
+    def _set_level(self, study: DesignFile) -> None:
+        """Put the level of the excitation into the scene's tables."""
+        excitation, level = self._data["excitation"], study.operation.level
+        del excitation["resonance_amplitude"]
+        fatigue = self._model.provenance.get("fatigue")
+        if "fatigue_fraction" in level or not level:
+            if fatigue is None:
+                raise InputError(
+                    f"{self.source}: operation: a level is missing; give force, base_acceleration or "
+                    "resonance_amplitude, or the case a material.fatigue_strength"
+                )
+            given = level.get("fatigue_fraction", fatigue["share"])
+            excitation["resonance_amplitude"] = fatigue["amplitude"] * given / fatigue["share"]
+        else:
+            excitation |= level
+
+    def _band(self) -> np.ndarray:
+        """Return the frequencies of the band: the study's, or those from the fixed resonance to the free one."""
+        given = self.study.operation.band
+        if given is not None:
+            return np.linspace(given.start, given.stop, given.num)
+        share = self.study.envelope.mass[1] / self.mass
+        low, high = _BAND[0] * self.frequency / math.sqrt(1.0 + share), _BAND[1] * self.frequency
+        width = 2.0 * (self._model.damping_ratio or _DAMPING) * self.frequency
+        count = int(np.clip(math.ceil(_PER_WIDTH * (high - low) / width), _FEWEST, _MOST))
+        return np.linspace(low, high, count)
+
+    def tables(self, device: Device, level: int | None) -> dict[str, Any]:
+        """Return the tables of a scene with a device, in the middle of what is uncertain.
+
+        level: number of natural modes; None: the whole reduced model.
+        """
+        envelope, middle = self.study.envelope, {name: sum(span) / 2 for name, span in self.uncertain.items()}
+        body: dict[str, Any] = {"mass": device.mass} | {name: middle[name] for name in ("friction", "restitution")}
+        if envelope.normal_load is not None:
+            body["normal_load"] = envelope.normal_load
+        cavity: dict[str, Any] = {"gap": device.gap}
+        if envelope.length is not None and level is None:
+            body |= {"shape": "block", "length": envelope.length, "height": envelope.height}
+            cavity["play"] = envelope.play or device.gap
+        names = [entry["name"] for entry in self.cavities]
+        order = sorted(index % len(names) for index in range(device.bodies))
+        modes = {} if level is None else {"modes": level, "natural": True, "file": str(self.rom.with_name(PLAIN))}
+        return {
+            **self._data,
+            "structure": self._data["structure"] | modes,
+            "gravity": self._data["gravity"] | {"orientation_deg": middle["orientation_deg"]},
+            "cavity": [entry | cavity for entry in self.cavities],
+            "damper": [{"cavity": names[index], **body} for index in order],
+            "time": dict(self._time),
+        }
+
+    def at(self, device: Device, level: int | None) -> Scene:
+        """Return such a scene. Raises InputError, naming the study, for a device that does not fit the model."""
+        return Scene.of(self.tables(device, level), self.source)
+
+    @property
+    def uncertain(self) -> dict[str, tuple[float, float]]:
+        """Ranges of what is uncertain of every device, by the names of UNCERTAIN."""
+        return self.study.envelope.uncertain
+
+    def ranges(self, device: Device) -> dict[str, tuple[float, float]]:
+        """Return the ranges of what is uncertain of a device, by paths, tolerances included; without single numbers."""
+        envelope = self.study.envelope
+        off, relative = envelope.gap_tolerance, envelope.mass_tolerance
+        spans = self.uncertain | {
+            "gap": (device.gap - off, device.gap + off),
+            "mass": (device.mass * (1.0 - relative), device.mass * (1.0 + relative)),
+        }
+        return {UNCERTAIN[name]: (low, high) for name, (low, high) in spans.items() if low < high}
+
+    def search(self, bodies: int) -> dict[str, Any]:
+        """Return the tables of the study that seeks mass and gap for a number of bodies (`vanedamp optimise`)."""
+        envelope, effort = self.study.envelope, self.study.effort
+        mass = [end / bodies for end in envelope.mass]
+        data = self.tables(Device(bodies, sum(mass) / 2, sum(envelope.gap) / 2), LEVELS[0])
+        excitation = data["excitation"]
+        if "base_acceleration" in excitation:  # of a search the level that gives the same resonance
+            excitation = {key: value for key, value in excitation.items() if not key.startswith("base_")}
+            data["excitation"] = excitation | {"resonance_amplitude": self.amplitude}
+        data.pop("wear", None)
+        halves: dict[str, Any] = {UNCERTAIN[name]: (high - low) / 2 for name, (low, high) in self.uncertain.items()}
+        halves["cavity.gap"] = envelope.gap_tolerance
+        halves["damper.mass"] = {"relative": envelope.mass_tolerance}
+        given = {path: half for path, half in halves.items() if half and half != {"relative": 0.0}}
+        return data | {
+            "optimise": {
+                "band": self.frequencies.tolist(), "measure": "amplitude_max", "samples": effort.samples,
+                "evaluations": effort.evaluations, "gradient_steps": 0, "seed": effort.seed,
+                "variables": {"damper.mass": mass, "cavity.gap": list(envelope.gap)}, "tolerances": given,
+                "map": {"along": 2},
+            }
+        }  # fmt: skip
+
+    def life(self, device: Device, level: int | None, keeps: float) -> dict[str, Any]:
+        """Return the tables of the study of a device's life; keeps: reduction that must remain."""
+        return self.tables(device, level) | {
+            "life": {
+                "hours": self.study.hours, "band": self.frequencies.tolist(), "dwell": self.dwell.tolist(),
+                "measure": "amplitude_max", "threshold": keeps, "tolerance": 0.05, "reach": 0.3,
+            }
+        }  # fmt: skip
+
+    @property
+    def dwell(self) -> np.ndarray:
+        """Fractions (f,) of the time at the frequencies of the band."""
+        weights = np.zeros(len(self.frequencies))
+        for frequency, hours in self.study.operation.spectrum or [(f, 1.0) for f in self.frequencies.tolist()]:
+            weights[np.argmin(np.abs(self.frequencies - frequency))] += hours
+        return weights / weights.sum()
+
+
+def plain_model(model: ReducedModel) -> ReducedModel:
+    """Return a reduced model without its hot spots."""
+    provenance = {key: value for key, value in model.provenance.items() if key != "hot_spots"}
+    return replace(model, outputs=(), output_rows=None, output_residual=None, recovery=None, provenance=provenance)

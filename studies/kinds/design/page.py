@@ -1,0 +1,92 @@
+"""Devices of studies: the one to build, what it holds with intervals, its worst curve, and why the others lost."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import plotly.graph_objects as go
+
+from vanedamp.files import store
+from vanedamp.studies.design.record import NAMES, DesignRecord
+from vanedamp.studies.design.verdict import HeldValue
+from vanedamp.studies.pipeline.tables import MODES
+from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.report.page import Page
+from vanedamp.studies.report.pictures import mode_picture
+
+ORDER = 1
+#: units of results on the page: name and factor
+_UNITS = {"m": ("µm", 1e6), "Pa": ("MPa", 1e-6), "h": ("h", 1.0), "1": ("", 1.0)}
+_CURVES = {"without bodies": "undamped", "bodies fixed": "fixed", "worst of all starts and draws": "worst"}
+
+
+def figure(record: DesignRecord) -> go.Figure:
+    """Draw the worst curve of the device, the curves without bodies and with bodies fixed, and the limit."""
+    drawn = go.Figure()
+    for number, (name, field) in enumerate(_CURVES.items()):
+        line = {"color": COLOURS[-1 - number] if number < 2 else COLOURS[0], "dash": ("dot", "dash", "solid")[number]}
+        drawn.add_scatter(x=record.frequency, y=1e6 * getattr(record, field), mode="lines", name=name, line=line)
+    for value in record.held:
+        if value.limit is not None and value.name.startswith("largest amplitude"):
+            height = value.limit * (1.0 if value.unit == "m" else record.reference)
+            drawn.add_hline(y=1e6 * height, line={"dash": "dash", "color": "#be185d"}, annotation_text="limit")
+    drawn.add_scatter(
+        x=[record.at["frequency"]], y=[1e6 * record.held[0].value], mode="markers", name="worst point",
+        marker={"size": 9, "color": COLOURS[1]},
+    )  # fmt: skip
+    drawn.update_xaxes(title_text="excitation frequency, Hz")
+    drawn.update_yaxes(title_text="largest amplitude, µm", rangemode="tozero")
+    return drawn
+
+
+def shown(file: str, record: DesignRecord, page: Page) -> dict[str, Any]:
+    """Return the parts of the sheet."""
+    rows = zip(record.frequency, *(getattr(record, field) for field in _CURVES.values()), strict=True)
+    chart = page.chart("design", dressed(figure(record), height=380), ("frequency", *_CURVES.values()), rows, [file])
+    at = {NAMES[path]: value for path, value in record.at.items() if path in NAMES}
+    return {
+        "record": record, "file": file, "chart": chart, "picture": _picture(Path(file).with_name(MODES)),
+        "rows": [_row(value) for value in record.held], "at": at, "drawing": _drawing(record),
+        "sensitive": [(NAMES[path], added / record.held[0].value) for path, added in record.by_number.items()],
+    }  # fmt: skip
+
+
+def _row(value: HeldValue) -> dict[str, Any]:
+    """Return a result as text."""
+    unit, factor = _UNITS[value.unit]
+
+    def text(number: float | None) -> str:
+        return "" if number is None else f"{factor * number:.3g}" if abs(factor * number) < 1e4 else f"{number:.2e}"
+
+    low, high = text(value.low), text(value.high)
+    interval = f"{low} to {high}" if low and high else f"from {low}" if low else f"up to {high}" if high else ""
+    margin = "" if value.margin is None else f"{value.margin:+.0%}"
+    limit = "" if value.limit is None else f"{'at least' if value.least else 'at most'} {text(value.limit)}"
+    return {
+        "name": value.name, "unit": unit, "value": text(value.value), "interval": interval, "due": value.due,
+        "limit": limit, "margin": margin, "grade": value.grade, "source": value.source,
+    }  # fmt: skip
+
+
+def _picture(modes: Path) -> str | None:
+    """Return the picture of the first bending in a file of modes, if there is one, as base64."""
+    if not modes.is_file():
+        return None
+    _, attributes = store.load(modes, "modes")
+    if "first_bending" not in attributes:
+        return None
+    png = mode_picture(modes, int(json.loads(str(attributes["first_bending"]))))
+    return None if png is None else base64.b64encode(png).decode()
+
+
+def _drawing(record: DesignRecord) -> list[dict[str, Any]]:
+    """Return the cavities with their bodies: positions in a drawing that is 300 wide and not to scale."""
+    drawings = []
+    for cavity in dict.fromkeys(record.cavities):
+        count = record.cavities.count(cavity)
+        width = (300 - 44) / count
+        drawings.append({"name": cavity, "bodies": [6 + width * number for number in range(count)], "width": width - 4})
+    return drawings
