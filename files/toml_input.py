@@ -216,12 +216,14 @@ def _unknown(schema: dict[str, Any], location: tuple[Any, ...], name: str) -> st
     """Explain a key that a table does not have: the variants that have it, or the keys that this one may have."""
     variants = _nodes(schema, location[:-1])
     # of several variants of a table the one at hand is a step of the location, by the value that distinguishes them
-    fitting = [node for node in variants if location[-2:-1] and location[-2] in constants(node).values()] or variants
+    tag = location[-2] if len(location) > 1 else ""
+    fitting = [node for node in variants if tag in constants(node).values()]
+    fitting = fitting or [node for node in variants if not constants(node)] or variants
     owners = [pair for node in variants if name in node.get("properties", {}) for pair in constants(node).items()]
     if owners:
-        (tag, mine), *_ = constants(fitting[0]).items()
-        others = " or ".join(f'{tag} = "{value}"' for tag, value in owners)
-        return f'belongs to {others}, not to {tag} = "{mine}"'
+        mine = next((f'{key} = "{value}"' for key, value in constants(fitting[0]).items()), tag)
+        others = " or ".join(f'{key} = "{value}"' for key, value in owners)
+        return f"belongs to {others}, not to {mine}"
     return f"unknown key; {nearest(name, sorted({key for node in fitting for key in node.get('properties', {})}))}"
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
-from vanedamp.meshes.parameters import ParameterError, check_elements, check_size
+from vanedamp.files.toml_input import Real, Whole
+from vanedamp.meshes.parameters import MeshParameters, ParameterError, check_elements, check_size
 from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 
@@ -17,28 +19,30 @@ _FACES = ("root", "tip", "left", "right", "bottom", "top")
 
 
 @dataclass(frozen=True)
-class TaperedBlock:
+class TaperedBlock(MeshParameters):
     """A block from x = 0 to `length`, symmetric about y = 0, from z = 0 to `thickness`.
 
     Facet groups: `root` (x = 0), `tip` (x = length), `left` and `right` (the faces of negative and positive y),
     `bottom` (z = 0) and `top`. Volume group: `block`.
     """
 
-    length: float
+    generator: Literal["block"] = field(default="block", kw_only=True)
+    """"block": a rod, beam or plate for verification"""
+    length: Real
     """length along x, from the root (x = 0) to the tip [m]"""
-    width: float
+    width: Real
     """width along y, at the root [m]"""
-    thickness: float
+    thickness: Real
     """thickness along z [m]"""
-    tip_width: float | None = None
+    tip_width: Real | None = None
     """width at the tip (default: that of the root) [m]"""
-    divisions: tuple[int, int, int] = (8, 1, 1)
+    divisions: tuple[Whole, Whole, Whole] = (8, 1, 1)
     """elements along x, y and z of a structured mesh"""
     hexahedra: bool = False
     """hexahedra in a structured mesh, in place of tetrahedra"""
-    element_size: float | None = None
+    element_size: Real | None = None
     """size of the tetrahedra of an unstructured mesh (default: structured) [m]"""
-    order: int = 1
+    order: Whole = 1
     """order of the elements' geometry: 1 straight, 2 curved"""
 
     def __post_init__(self) -> None:

@@ -1,12 +1,18 @@
-"""Parameters of the vane cluster, and the checks of a mesh's parameters."""
+"""Parameters of the vane cluster, and what the parameters of all meshes share: keys and checks."""
 
 import math
-from dataclasses import dataclass, fields
-from numbers import Integral, Real
+from dataclasses import dataclass, field, fields
+from numbers import Integral
+from numbers import Real as RealNumber
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import ConfigDict, Field
 
 from vanedamp.files.errors import VanedampError
+from vanedamp.files.toml_input import STRICT, Real, Whole
+
+Degree = Annotated[Whole, Field(ge=1, le=3)]
 
 
 class ParameterError(VanedampError):
@@ -40,12 +46,27 @@ def check_size(size: float, volume: float) -> None:
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class MeshParameters:
+    """Base of the parameters of a mesh, which with these are the keys of [mesh]."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+    generator: str
+    degree: Degree = 2
+    """polynomial degree of the displacements"""
+
+    @property
+    def own(self) -> list[Any]:
+        """The fields of the geometry."""
+        return [item for item in fields(self) if not item.kw_only]
+
+
 _DAMPER = ("damper_width", "damper_height", "damper_depth")
 
 
 @dataclass(frozen=True)
-class VaneCluster:
-    """Parameters of the cluster, SI units, angles in degrees. The defaults belong to the shipped `vane_cluster.msh`.
+class VaneCluster(MeshParameters):
+    """Vanes between two shrouds, SI units, angles in degrees. The defaults belong to the shipped `vane_cluster.msh`.
 
     Facet groups: `clamp` (outer surface of the outer shroud), `shroud` (inner surface of the inner shroud: its average
     tangential displacement is the response), `shroud_low` and `shroud_high` (end faces of the inner shroud, at the
@@ -61,58 +82,60 @@ class VaneCluster:
     of a wall that it covers is no part of the wall's facet group.
     """
 
-    airfoils: int = 4
+    generator: Literal["vane_cluster"] = field(default="vane_cluster", kw_only=True)
+    """"vane_cluster": the parametric cluster"""
+    airfoils: Whole = 4
     """number of airfoils"""
-    pitch_deg: float = 4.0
+    pitch_deg: Real = 4.0
     """angle between two airfoils [degree]"""
-    inner_radius: float = 0.230
+    inner_radius: Real = 0.230
     """inner radius of the inner shroud [m]"""
-    inner_thickness: float = 0.010
+    inner_thickness: Real = 0.010
     """radial thickness of the inner shroud [m]"""
-    span: float = 0.025
+    span: Real = 0.025
     """radial length of the airfoils between the shrouds [m]"""
-    outer_thickness: float = 0.008
+    outer_thickness: Real = 0.008
     """radial thickness of the outer shroud [m]"""
-    axial_length: float = 0.024
+    axial_length: Real = 0.024
     """axial length of the shrouds [m]"""
-    chord: float = 0.022
+    chord: Real = 0.022
     """chord of the airfoils [m]"""
-    thickness: float = 0.00371
+    thickness: Real = 0.00371
     """largest thickness of the airfoils [m]"""
-    edge_thickness: float = 0.0008
+    edge_thickness: Real = 0.0008
     """thickness of the airfoils at the trailing edge [m]"""
-    camber_deg: float = 20.0
+    camber_deg: Real = 20.0
     """angle between the ends of the airfoils' camber line, a circular arc [degree]"""
-    stagger_deg: float = 12.0
+    stagger_deg: Real = 12.0
     """angle of the chord to the axis [degree]"""
-    cavities: int = 1
+    cavities: Whole = 1
     """number of cavities, spread evenly; 0: none"""
-    cavity_width: float = 0.014
+    cavity_width: Real = 0.014
     """tangential width of a cavity [m]"""
-    cavity_height: float = 0.005
+    cavity_height: Real = 0.005
     """radial height of a cavity [m]"""
-    cavity_depth: float = 0.012
+    cavity_depth: Real = 0.012
     """axial depth of a cavity, from the end face at positive x [m]"""
-    cavity_wall: float = 0.001
+    cavity_wall: Real = 0.001
     """least thickness of the wall around a cavity [m]"""
-    damper_width: float = 0.0
+    damper_width: Real = 0.0
     """tangential width of a body tied into every cavity; 0: none [m]"""
-    damper_height: float = 0.0
+    damper_height: Real = 0.0
     """radial height of the tied body [m]"""
-    damper_depth: float = 0.0
+    damper_depth: Real = 0.0
     """axial depth of the tied body [m]"""
-    element_size: float = 0.0026
+    element_size: Real = 0.0026
     """size of the elements [m]"""
-    order: int = 1
+    order: Whole = 1
     """order of the elements' geometry: 1 straight, 2 curved"""
 
     def __post_init__(self) -> None:
-        for item in fields(self):
+        for item in self.own:
             value, least = getattr(self, item.name), 0 if item.name == "cavities" else 1
             if isinstance(item.default, int):
                 if not isinstance(value, Integral) or value < least:
                     raise ParameterError(f"{item.name}: expected a whole number of at least {least}, not {value!r}")
-            elif not isinstance(value, Real) or not math.isfinite(value):
+            elif not isinstance(value, RealNumber) or not math.isfinite(value):
                 raise ParameterError(f"{item.name}: expected a finite number, not {value!r}")
             elif item.name in _DAMPER:
                 if value < 0.0:

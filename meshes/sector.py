@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from vanedamp.meshes.parameters import ParameterError, check_elements
+from vanedamp.files.toml_input import Real, Whole
+from vanedamp.meshes.parameters import MeshParameters, ParameterError, check_elements
 from vanedamp.modal import gmsh_on_demand as gmsh
 from vanedamp.modal import msh
 
@@ -23,7 +25,7 @@ _WIDEST = math.radians(30.0)
 
 
 @dataclass(frozen=True)
-class Sector:
+class Sector(MeshParameters):
     """A sector of a disk with a blade, or of an annular plate without, symmetric about y = 0 and z = 0.
 
     Facet groups: `low` and `high` (the faces at negative and positive y, of which a turn about z brings the first to
@@ -32,35 +34,37 @@ class Sector:
     and the smaller radius). Volume groups: `disk`, `blade`.
     """
 
-    sectors: int
+    generator: Literal["sector"] = field(default="sector", kw_only=True)
+    """"sector": for [ring], a sector of a bladed disk or an annular plate"""
+    sectors: Whole
     """number of sectors around the ring"""
-    inner_radius: float
+    inner_radius: Real
     """inner radius of the disk [m]"""
-    outer_radius: float
+    outer_radius: Real
     """outer radius of the disk, where the blade begins [m]"""
-    thickness: float
+    thickness: Real
     """axial thickness of the disk [m]"""
-    element_size: float
+    element_size: Real
     """largest size of the elements [m]"""
-    blade_length: float = 0.0
+    blade_length: Real = 0.0
     """radial length of the blade; 0: none [m]"""
-    blade_thickness: float = 0.0
+    blade_thickness: Real = 0.0
     """tangential thickness of the blade [m]"""
-    blade_width: float = 0.0
+    blade_width: Real = 0.0
     """axial width of the blade, at most that of the disk (default: that) [m]"""
-    cavity_length: float = 0.0
+    cavity_length: Real = 0.0
     """radial length of the cavity in the blade; 0: solid [m]"""
-    cavity_thickness: float = 0.0
+    cavity_thickness: Real = 0.0
     """tangential thickness of the cavity [m]"""
-    cavity_width: float = 0.0
+    cavity_width: Real = 0.0
     """axial width of the cavity [m]"""
-    cavity_wall: float = 0.0
+    cavity_wall: Real = 0.0
     """wall between the cavity and the tip (default: the cavity is in the middle) [m]"""
-    order: int = 1
+    order: Whole = 1
     """order of the elements' geometry: 1 straight, 2 curved"""
 
     def __post_init__(self) -> None:
-        for item in fields(self):
+        for item in self.own:
             value = getattr(self, item.name)
             if not math.isfinite(value) or value < 0.0 or (item.default is MISSING and value == 0.0):
                 raise ParameterError(f"{item.name}: expected a positive number, not {value}")

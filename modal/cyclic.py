@@ -13,12 +13,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
+from pydantic import ConfigDict
 from scipy import linalg, sparse
 
 from vanedamp.files import store
+from vanedamp.files.toml_input import STRICT, Axes
 from vanedamp.modal.algebra import rotation
 from vanedamp.modal.cyclic_faces import TOLERANCE, CyclicError, check_sides, paired
 from vanedamp.modal.matrices import SystemMatrices, patch_average, unit_direction
@@ -43,22 +45,20 @@ def aliased(order: int, sectors: int) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class SectorSpring:
-    """Springs from every sector to the next, between the mean displacements of two patches.
+    """Springs from every sector to the next, between the mean displacements of two facet groups."""
 
-    low, high  patches: `high` of a sector and `low` of the next one
-    stiffness  (3,) N/m along the axes x, y, z of sector 0, turned with the sector of `high`
-
-    Raises CyclicError unless the stiffnesses are finite, not negative and not all zero.
-    """
-
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     low: str
+    """facet group of the next sector"""
     high: str
-    stiffness: tuple[float, float, float]
+    """facet group of the sector itself"""
+    stiffness: Axes
+    """stiffness in all directions, or along [x, y, z], axes that turn with the sector [N/m]"""
 
     def __post_init__(self) -> None:
         values = self.stiffness
         if len(values) != 3 or not all(math.isfinite(value) and value >= 0.0 for value in values) or not any(values):
-            raise CyclicError(f"ring.spring.stiffness: expected N/m along x, y, z, not {values}")
+            raise CyclicError("stiffness: expected N/m above zero, such as 1e7 or [1e7, 5e6, 1e7]")
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from vanedamp.files.errors import VanedampError
 from vanedamp.modal.algebra import rotation
@@ -32,6 +31,8 @@ def paired(
     Raises CyclicError with the reason where a turn by the angle of a sector does not bring one face to the other, or
     the supports of two paired nodes differ.
     """
+    from scipy.spatial import cKDTree  # cases load this file
+
     first, second = matrices.patch(low), matrices.patch(high)
     size = float(np.ptp(matrices.coordinates, axis=0).max())
     rotated = rotation(axis, 2.0 * math.pi / sectors)

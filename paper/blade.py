@@ -76,7 +76,7 @@ def blade() -> Blade:
         lagwise=lagwise,
         full=np.array([solve_modes(rotating.at(speed), COUNT).frequencies_hz for speed in speeds]),
         reduced=np.array([model.at_speed(speed).natural_frequencies_hz[:COUNT] for speed in speeds]),
-        hub=-case.rotation.point[0] / case.mesh.parameters.length,  # type: ignore[union-attr]
+        hub=-case.rotation.point[0] / case.mesh.length,  # type: ignore[union-attr]
     )
 
 

@@ -32,26 +32,30 @@ def axis_values(values: Range | Sequence[Any]) -> list[Any]:
     return list(values)
 
 
-def assign(node: Any, steps: list[str], value: Any, path: str) -> None:
-    """Change plain scene data at the end of `steps`, which stand in `path`. Raises InputError for an unknown place."""
-    for place in list(_places(node, steps, path)):
-        table = node
-        for step in place[:-1]:
-            table = table[step]
-        table[place[-1]] = value
+def assign(node: Any, path: str, value: Any) -> None:
+    """Change plain scene data at the end of a path. Raises InputError for an unknown place."""
+    for place in list(_places(node, path)):
+        table_at(node, place)[place[-1]] = value
+
+
+def table_at(data: Any, place: Sequence[str | int]) -> Any:
+    """Return the table, or list, that holds the value at a place of plain data."""
+    for step in place[:-1]:
+        data = data[step]
+    return data
 
 
 def with_numbers(scene: Any, data: Any, numbers: Mapping[str, Any]) -> Any:
     """Return a scene with numbers that have derivatives in place of its own, by their paths. data: its plain data."""
     for path, number in numbers.items():
-        for place in _places(data, path.split("."), path):
+        for place in _places(data, path):
             scene = with_number(scene, place, number)
     return scene
 
 
 def places(data: Any, path: str) -> list[str]:
     """Return the paths of the values that a path names in plain scene data. Raises InputError for an unknown place."""
-    return [".".join(map(str, place)) for place in _places(data, path.split("."), path)]
+    return [".".join(map(str, place)) for place in _places(data, path)]
 
 
 def namesake(data: Any, path: str, others: Iterable[str]) -> str | None:
@@ -69,13 +73,16 @@ def namesake(data: Any, path: str, others: Iterable[str]) -> str | None:
 def _known_places(data: Any, path: str) -> set[tuple[Any, ...]]:
     """Return the places that a path names; none where it names no place, which is said elsewhere."""
     try:
-        return set(_places(data, path.split("."), path))
+        return set(_places(data, path))
     except InputError:
         return set()
 
 
-def _places(node: Any, steps: list[str], path: str, before: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Yield the keys and indices that lead to each value at the end of `steps`. Raises InputError as `assign`."""
+def _places(
+    node: Any, path: str, left: list[str] | None = None, before: tuple[Any, ...] = ()
+) -> Iterator[tuple[Any, ...]]:
+    """Yield the keys and indices that lead to each value at the end of a path. Raises InputError as `assign`."""
+    steps = path.split(".") if left is None else left
     if not steps:
         raise InputError(f"scene: {path}: names a table, not a value")
     head, rest = steps[0], steps[1:]
@@ -84,11 +91,11 @@ def _places(node: Any, steps: list[str], path: str, before: tuple[Any, ...] = ()
     if isinstance(node, list):
         entries, rest = _entries(node, head, steps, path)
         for entry in entries:
-            yield from _places(node[entry], rest, path, (*before, entry))
+            yield from _places(node[entry], path, rest, (*before, entry))
     elif rest:
         if head not in node:
             raise InputError(f"scene: {path}: no table '{head}'; {nearest(head, list(node))}")
-        yield from _places(node[head], rest, path, (*before, head))
+        yield from _places(node[head], path, rest, (*before, head))
     else:
         yield (*before, head)
 
@@ -118,26 +125,14 @@ def number_at(node: Any, path: str) -> float:
 
     Raises InputError for a place that is unknown, or holds no number or several.
     """
-    nodes = [node]
-    steps = path.split(".")
-    while steps:
-        head, *steps = steps
-        inner = []
-        for one in nodes:
-            if isinstance(one, list) and (head.isdecimal() or all(isinstance(entry, dict) for entry in one)):
-                found, rest = _entries(one, head, [head, *steps], path)
-                entries = [one[entry] for entry in found]
-                if len(rest) > len(steps):  # the step is a key of every entry
-                    entries = [entry[head] for entry in entries if head in entry]
-                inner += entries
-            elif isinstance(one, dict) and head in one:
-                inner.append(one[head])
-            else:
-                known = f"; {nearest(head, list(one))}" if isinstance(one, dict) else ""
-                raise InputError(f"scene: {path}: the scene holds no '{head}' there{known}")
-        nodes = inner
-    values = {float(value) for value in nodes if isinstance(value, int | float) and not isinstance(value, bool)}
-    if len(values) != 1 or len(nodes) == 0:
-        shown = "several numbers; name one entry by its index" if len(values) > 1 else "no number"
+    found = list(_places(node, path))
+    tables = [table_at(node, place) for place in found]
+    values = [table[place[-1]] for table, place in zip(tables, found, strict=True) if place[-1] in table]
+    if tables and not values:
+        key = found[0][-1]
+        raise InputError(f"scene: {path}: the scene holds no '{key}' there; {nearest(key, list(tables[0]))}")
+    numbers = {float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)}
+    if len(numbers) != 1:
+        shown = "several numbers; name one entry by its index" if numbers else "no number"
         raise InputError(f"scene: {path}: names {shown}")
-    return values.pop()
+    return numbers.pop()

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from vanedamp.coupling.scene.paths import assign
+from vanedamp.coupling.scene.paths import assign, table_at
 from vanedamp.files.toml_input import STRICT, InputError, Whole, dotted, lists_for_numbers, plain, validate
 
 T = TypeVar("T")
@@ -55,7 +55,7 @@ def read(record: type[T], data: Mapping[str, Any], source: str) -> T:
     for end in (0, 1) if ranges else ():
         ends = copy.deepcopy(dict(data)) | {"ranges": {}}
         for path, values in ranges.items():
-            assign(ends, path.split("."), values[end], path)
+            assign(ends, path, values[end])
         validate(record, ends, source)
     return scene
 
@@ -100,9 +100,7 @@ def _peeled(data: dict[str, Any], places: list[list[Any]], source: str) -> dict[
     logarithmic = isinstance(table, dict) and table.get("distribution") == "log-uniform"
     data, ranges = copy.deepcopy(data), {}
     for place in places:
-        node: Any = data
-        for step in place[:-1]:
-            node = node[step]
+        node = table_at(data, place)
         low, high = _ends(node[place[-1]], f"{source}: {dotted(place)}", logarithmic)
         node[place[-1]] = math.sqrt(low * high) if logarithmic else (low + high) / 2
         ranges[".".join(map(str, place))] = [low, high]

@@ -626,7 +626,7 @@ class Scene(OpenRecord, Displayed):
         data = self.to_dict()
         data["ranges"] = {path: ends for path, ends in data["ranges"].items() if namesake(data, path, values) is None}
         for path, value in values.items():
-            assign(data, path.split("."), value, path)
+            assign(data, path, value)
         return read(Scene, data, "scene")
 
     def sweep_points(self) -> tuple[dict[str, np.ndarray], Iterator[dict[str, Any]]]:

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Iterator
 from typing import Any
 
-from vanedamp.coupling.scene.paths import Range, axis_values
+from vanedamp.coupling.scene.paths import Range, axis_values, table_at
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.toml_input import validated_or_none
 
@@ -21,11 +21,8 @@ def short_form(scene: Scene) -> dict[str, Any]:
         data["sweep"][path] = _range(values)
     for place in list(_places(data)):
         without = copy.deepcopy(data)
-        table = without
         try:
-            for step in place[:-1]:
-                table = table[step]
-            del table[place[-1]]
+            del table_at(without, place)[place[-1]]
         except (KeyError, IndexError):  # its table is gone already
             continue
         if _reads_as(without, whole):

@@ -50,7 +50,7 @@ class Points:
         """Return the scene at a point with its choices open. Raises InputError for a point that is no scene."""
         try:
             for path, value in values.items():  # each point sets the same places
-                assign(self._data, path.split("."), value, path)
+                assign(self._data, path, value)
             return validate(Scene, self._data, "scene")
         except InputError as error:
             point = ", ".join(f"{path} = {value!r}" for path, value in values.items())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -110,6 +110,29 @@ class Campbell(Record, Plotted):
         if not self.diameters.size:
             return f"mode {mode + 1}"
         return f"{self.families[mode] + 1} of h={self.diameters[mode]}"
+
+    def of_modes(self, diameters: np.ndarray, families: np.ndarray) -> Campbell:
+        """Return the diagram of a ring with the modes of these diameters and families; nan where it has none."""
+        wanted, own = (
+            list(zip(of.tolist(), order.tolist(), strict=True))
+            for of, order in ((diameters, families), (self.diameters, self.families))
+        )
+        if wanted == own:
+            return self
+        numbers = {pair: mode for mode, pair in enumerate(wanted)}
+        frequencies = np.full((len(wanted), self.speeds.size), np.nan)
+        for pair, curve in zip(own, self.frequencies_hz, strict=True):
+            if pair in numbers:
+                frequencies[numbers[pair]] = curve
+        crossings = ((crossing, numbers.get(own[crossing.mode])) for crossing in self.crossings)
+        return replace(
+            self,
+            modes=np.arange(len(wanted)),
+            frequencies_hz=frequencies,
+            crossings=tuple(replace(crossing, mode=mode) for crossing, mode in crossings if mode is not None),
+            diameters=diameters,
+            families=families,
+        )
 
     @property
     def rpm(self) -> np.ndarray:

@@ -8,17 +8,42 @@ Vargo, Schiffer and Dello (1988), Proceedings of the 17th Turbomachinery Symposi
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from vanedamp.files.display import Plotted
-from vanedamp.files.record import Array, Named, Record, RecordRows, Within, empty
+from vanedamp.files.record import Array, Named, Own, Record, Within, empty
+from vanedamp.files.store import Variable
 from vanedamp.modal.cyclic import aliased
-from vanedamp.modal.records.campbell import RPM, OrderCrossing
+from vanedamp.modal.records.campbell import RPM, Campbell, OrderCrossing
 from vanedamp.modal.records.ring_modes import RingModes
+
+#: variables of the Campbell diagram: in the file, and its own; then its crossings
+_OVER_SPEED = {"speed": "speed", "frequency_over_speed": "frequency"}
+_CROSSING = [f"crossing_{item.name}" for item in fields(OrderCrossing)]
+
+
+def _in_file(diagram: Campbell) -> dict[str, Variable]:
+    names = _OVER_SPEED | {name: name for name in _CROSSING if diagram.crossings}
+    variables = diagram.variables()
+    return {name: variables[own] for name, own in names.items()}
+
+
+def _of_file(values: Mapping[str, Any]) -> Campbell | None:
+    """Return the diagram in a file, which has no errors and solutions."""
+    if "speed" not in values:
+        return None
+    speeds, count = values["speed"], len(values["diameter"])
+    rows = zip(*(values[name].tolist() for name in _CROSSING if name in values), strict=True)
+    return Campbell(
+        speeds, np.ones(speeds.size, bool), np.arange(count), values["frequency_over_speed"],
+        np.full(speeds.size, np.nan), empty(), tuple(values["engine_order"].tolist()),
+        tuple(OrderCrossing(*row) for row in rows), (), diameters=values["diameter"], families=values["family"],
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,18 +60,30 @@ class Interference(Record, Plotted):
     """speed of rotation; None: the ring does not rotate [rad/s]"""
     operating: Annotated[tuple[float, float] | None, Array(("edge",), "rad/s", attribute=True)] = None
     """lowest and highest speed of operation; None: not known"""
-    speeds: Annotated[np.ndarray, Array(("speed",), "rad/s", name="speed")] = field(default_factory=empty)
-    """speeds of a Campbell diagram, ascending; empty: frequencies do not depend on the speed"""
-    over_speed_hz: Annotated[np.ndarray, Array(("mode", "speed"), "Hz", name="frequency_over_speed")] = field(
-        default_factory=empty
-    )
-    """frequencies at `speeds`; nan where a mode was not computed"""
-    crossings: Annotated[tuple[OrderCrossing, ...], RecordRows("crossing")] = ()
-    """crossings of orders and modes in the diagram"""
+    campbell: Annotated[Campbell | None, Own(_in_file, _of_file)] = None
+    """Campbell diagram of the ring, with a row for each of `modes`; None: frequencies do not depend on the speed"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "orders", tuple(self.orders) or tuple(range(1, self.modes.sectors + 1)))
+        if self.campbell is not None:
+            diagram = self.campbell.of_modes(self.modes.diameters, self.modes.families)
+            object.__setattr__(self, "campbell", diagram)
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """Speeds (s,) of the Campbell diagram, ascending, rad/s; empty without one."""
+        return empty() if self.campbell is None else self.campbell.speeds
+
+    @property
+    def over_speed_hz(self) -> np.ndarray:
+        """Frequencies (m, s) of the modes at `speeds`, Hz; nan where a mode was not computed."""
+        return empty() if self.campbell is None else self.campbell.frequencies_hz
+
+    @property
+    def crossings(self) -> tuple[OrderCrossing, ...]:
+        """Crossings of orders and modes in the Campbell diagram."""
+        return () if self.campbell is None else self.campbell.crossings
 
     @property
     def diameters(self) -> np.ndarray:
@@ -91,7 +128,7 @@ class Interference(Record, Plotted):
 
         Over the speeds of the Campbell diagram, or of operation without one.
         """
-        if self.speeds.size or self.operating is None:
+        if self.campbell is not None or self.operating is None:
             return self.crossings
         low, high = self.operating
         crossings = [

@@ -10,10 +10,11 @@ import math
 from dataclasses import dataclass, replace
 
 from vanedamp.files.toml_input import InputError
+from vanedamp.meshes.parameters import VaneCluster
 from vanedamp.modal.eigen import solve_modes
 from vanedamp.modal.participation import first_bending
 from vanedamp.studies.case.stages import assemble, reduction
-from vanedamp.studies.case.tables import Case, InterfaceTable, VaneClusterMesh
+from vanedamp.studies.case.tables import Case, InterfaceTable
 
 SOFTENED = 1e-2
 WEIGHTLESS = 1e-6
@@ -56,14 +57,14 @@ def compare_tied(case: Case, modes: int = 12) -> TiedComparison:
     modes  fixed-interface modes of the reduced model. Raises InputError for a case without such bodies.
     """
     mesh = case.mesh
-    if not isinstance(mesh, VaneClusterMesh) or not mesh.parameters.damper_volume:
+    if not isinstance(mesh, VaneCluster) or not mesh.damper_volume:
         raise InputError(
             "mesh.damper_width: the comparison needs the generator vane_cluster with width, height and depth of a body"
         )
     material = case.material.get(_GROUP) or case.material.get("default")
     if material is None:
         raise InputError(f"material.{_GROUP}: missing; the bodies need a material")
-    mass = material.density * mesh.parameters.damper_volume
+    mass = material.density * mesh.damper_volume
     free = reduction(assemble(_without_bodies(case, mesh)), modes)
     loaded = free.with_masses((floor, mass / len(free.interface)) for floor in free.interface)
     soft = replace(material, young=SOFTENED * material.young)
@@ -84,13 +85,12 @@ def _first_bending_hz(case: Case) -> float:
     return float(modes.frequencies_hz[first_bending(modes, matrices, case.modes.direction)])
 
 
-def _without_bodies(case: Case, mesh: VaneClusterMesh) -> Case:
+def _without_bodies(case: Case, mesh: VaneCluster) -> Case:
     """Return the case with empty cavities, its interface the tangential motion of their floors."""
-    bare = replace(mesh.parameters, damper_width=0.0, damper_height=0.0, damper_depth=0.0)
     materials = {group: table for group, table in case.material.items() if group != _GROUP}
     floors = {}
-    for number, angle in enumerate(mesh.parameters.cavity_angles(), start=1):
+    for number, angle in enumerate(mesh.cavity_angles(), start=1):
         floor = f"c{number}_floor"
         floors[floor] = InterfaceTable(floor, (0.0, math.cos(angle), -math.sin(angle)))
-    mesh, table = replace(mesh, parameters=bare), replace(case.modes, at=None)
-    return replace(case, mesh=mesh, material=materials, interface=floors, modes=table)
+    bare, table = replace(mesh, damper_width=0.0, damper_height=0.0, damper_depth=0.0), replace(case.modes, at=None)
+    return replace(case, mesh=bare, material=materials, interface=floors, modes=table)

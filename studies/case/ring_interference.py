@@ -6,10 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from vanedamp.files.toml_input import InputError
-from vanedamp.modal.records.campbell import Campbell
 from vanedamp.modal.records.interference import Interference
 from vanedamp.modal.records.ring_modes import RingModes
 from vanedamp.studies.case.stages import campbell_diagram
@@ -48,17 +45,4 @@ def ring_interference(
         return interference
     wanted = replace(table, modes=int(modes.families.max()) + 1, engine_orders=interference.orders)
     diagram = campbell_diagram(replace(structure, case=replace(structure.case, campbell=wanted)), report, checkpoint)
-    rows = {pair: row for row, pair in enumerate(_pairs(modes))}
-    curves = [rows.get(pair) for pair in _pairs(diagram)]
-    over = np.full((len(modes), len(diagram.speeds)), np.nan)
-    for row, curve in zip(curves, diagram.frequencies_hz, strict=True):
-        if row is not None:
-            over[row] = curve
-    crossings = [(crossing, curves[crossing.mode]) for crossing in diagram.crossings]
-    renumbered = tuple(replace(crossing, mode=row) for crossing, row in crossings if row is not None)
-    return replace(interference, speeds=diagram.speeds, over_speed_hz=over, crossings=renumbered)
-
-
-def _pairs(modes: RingModes | Campbell) -> list[tuple[int, int]]:
-    """Return diameter and family of each mode."""
-    return list(zip(modes.diameters.tolist(), modes.families.tolist(), strict=True))
+    return replace(interference, campbell=diagram)

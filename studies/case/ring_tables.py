@@ -9,30 +9,12 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from vanedamp.files.toml_input import STRICT, Axes, Direction, Positive, Real, Whole
+from vanedamp.files.toml_input import STRICT, Direction, Positive, Real, Whole
+from vanedamp.modal.cyclic import CyclicSector, SectorSpring, cyclic_sector
 from vanedamp.studies.case.operation_tables import RotationTable
 
 if TYPE_CHECKING:
-    from vanedamp.modal.cyclic import CyclicSector
     from vanedamp.modal.matrices import SystemMatrices
-
-
-@dataclass(frozen=True, config=STRICT)
-class RingSpringTable:
-    """Springs from every sector to the next, between the mean displacements of two facet groups."""
-
-    low: str
-    """facet group of the next sector"""
-    high: str
-    """facet group of the sector itself"""
-    stiffness: Axes
-    """stiffness in all directions, or along [x, y, z], axes that turn with the sector [N/m]"""
-
-    def __post_init__(self) -> None:
-        if self.low == self.high:
-            raise ValueError(f"high: expected another group than low, {self.low!r}")
-        if not any(self.stiffness):
-            raise ValueError("stiffness: expected N/m above zero, such as 1e7 or [1e7, 5e6, 1e7]")
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -52,7 +34,7 @@ class RingTable:
     """a point of the axis (default: that of [rotation], or else the origin) [m]"""
     tolerance: Annotated[Positive, Field(le=1e-2)] = 1e-6
     """largest distance of two nodes that are one, over the size of the sector [-]"""
-    spring: tuple[RingSpringTable, ...] = ()
+    spring: tuple[SectorSpring, ...] = ()
     """springs between neighbours"""
     deviating: tuple[str, ...] = ()
     """volume groups that the deviations of mistuning change, such as ["blade"] (default: the whole sector)"""
@@ -62,8 +44,9 @@ class RingTable:
             raise ValueError("give both faces, low and high, or none of separate structures")
         if self.low is None and not self.spring:
             raise ValueError("low: missing; give the faces low and high, or [[ring.spring]] of separate structures")
-        if self.low is not None and self.low == self.high:
-            raise ValueError(f"high: expected another group than low, {self.low!r}")
+        for key, group in (groups := self.groups).items():
+            if key.endswith("high") and group == groups[key.replace("high", "low")]:
+                raise ValueError(f"{key}: expected another group than low, {group!r}")
 
     @property
     def groups(self) -> dict[str, str]:
@@ -91,9 +74,6 @@ class RingTable:
 
     def sector(self, matrices: SystemMatrices, rotation: RotationTable | None) -> CyclicSector:
         """Return the sector with these matrices; rotation: has the axis unless the table does. Raises CyclicError."""
-        from vanedamp.modal.cyclic import SectorSpring, cyclic_sector
-
-        springs = [SectorSpring(spring.low, spring.high, spring.stiffness) for spring in self.spring]
         return cyclic_sector(
-            matrices, self.low, self.high, self.sectors, *self._axis(rotation), springs, self.tolerance
+            matrices, self.low, self.high, self.sectors, *self._axis(rotation), self.spring, self.tolerance
         )

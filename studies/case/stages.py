@@ -17,6 +17,7 @@ import numpy as np
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import Variable, load_any, save
 from vanedamp.files.toml_input import InputError
+from vanedamp.meshes.generators import build
 from vanedamp.modal.campbell import campbell
 from vanedamp.modal.correlation import mode_like
 from vanedamp.modal.cyclic_campbell import ring_campbell
@@ -122,7 +123,7 @@ def _mesh(case: Case) -> Iterator[Path]:
             target = Path(folder) / f"{Path(mesh.file).stem}.msh"
             yield convert(mesh.file, target, case.volume_groups, case.facet_groups)
         else:
-            yield mesh.build(Path(folder) / f"{mesh.generator}.msh")
+            yield build(mesh, Path(folder) / f"{mesh.generator}.msh")
 
 
 def _functional(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, GetJsonSchemaHandler, GetPydanticSchema, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, GetPydanticSchema, Tag
 from pydantic.dataclasses import dataclass
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
 
 from vanedamp.coupling.scene.mistuning import DEVIATIONS, Mistuning
 from vanedamp.coupling.strength.material import Fatigue
@@ -30,9 +28,8 @@ from vanedamp.files.toml_input import (
     read_toml,
     validate,
 )
-from vanedamp.meshes import benchmarks, sector, vane_cluster
-from vanedamp.meshes.benchmarks import TaperedBlock
-from vanedamp.meshes.parameters import VaneCluster
+from vanedamp.meshes.generators import Generated
+from vanedamp.meshes.parameters import Degree
 from vanedamp.meshes.sector import Sector
 from vanedamp.modal.units import absurdity, strength_absurdity
 from vanedamp.studies.case.calibration_tables import CalibrationTable, HotSpotTable
@@ -40,7 +37,6 @@ from vanedamp.studies.case.operation_tables import CampbellTable, RotationTable,
 from vanedamp.studies.case.ring_tables import RingTable
 
 Ratio = Annotated[Real, Field(ge=0, lt=1)]
-Degree = Annotated[Whole, Field(ge=1, le=3)]
 # 1/K: no solid expands more
 _EXPANSION = 1e-3
 # by which `young` and `young_at` may differ at the reference temperature, relative
@@ -71,59 +67,6 @@ class MeshFile:
         return [str(file) for file in mesh_files(self.file)]
 
 
-class _Generated:
-    """Base of meshes by a generator, whose parameters are keys of [mesh], as its own are."""
-
-    generator: Any
-    parameters: Any
-
-    def build(self, path: str | Path) -> Path:
-        """Write the mesh. Raises the errors of `build` of its generator in meshes."""
-        return _BUILD[self.generator](self.parameters, path)
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        json_schema = handler(schema)
-        table = handler.resolve_ref_schema(json_schema)
-        parameters = handler.resolve_ref_schema(table["properties"].pop("parameters"))
-        table["properties"] |= parameters["properties"]
-        table["required"] = [*parameters.get("required", ()), "generator"]
-        return json_schema
-
-
-@dataclass(frozen=True, config=STRICT)
-class VaneClusterMesh(_Generated):
-    """The parametric vane cluster; in the file its parameters are keys of [mesh]."""
-
-    generator: Literal["vane_cluster"]
-    """"vane_cluster": the parametric cluster"""
-    parameters: VaneCluster
-    degree: Degree = 2
-    """polynomial degree of the displacements"""
-
-
-@dataclass(frozen=True, config=STRICT)
-class BlockMesh(_Generated):
-    """A block for verification; in the file its parameters are keys of [mesh]."""
-
-    generator: Literal["block"]
-    """"block": a rod, beam or plate for verification"""
-    parameters: TaperedBlock
-    degree: Degree = 2
-    """polynomial degree of the displacements"""
-
-
-@dataclass(frozen=True, config=STRICT)
-class SectorMesh(_Generated):
-    """A sector of a bladed disk or an annular plate; in the file its parameters are keys of [mesh]."""
-
-    generator: Literal["sector"]
-    """"sector": a sector of a bladed disk or an annular plate, for [ring]"""
-    parameters: Sector
-    degree: Degree = 2
-    """polynomial degree of the displacements"""
-
-
 #: keys that name a file: the mesh, and measurements
 FILES = (
     ("mesh", "file"),
@@ -134,39 +77,23 @@ FILES = (
     *(("mistuning", name, "file") for name in DEVIATIONS),
 )
 
-#: the records of the generators' parameters
-GENERATORS: dict[str, type] = {"vane_cluster": VaneCluster, "block": TaperedBlock, "sector": Sector}
-_BUILD: dict[str, Callable[[Any, str | Path], Path]] = {
-    "vane_cluster": vane_cluster.build,
-    "block": benchmarks.build,
-    "sector": sector.build,
-}
+
+def _source(mesh: Any) -> str:
+    """Return where a mesh comes from, which messages name."""
+    generated = "generator" in mesh if isinstance(mesh, Mapping) else hasattr(mesh, "generator")
+    return "a generator" if generated else "a file"
 
 
-def _kind(table: Any) -> str:
-    generator = table.get("generator") if isinstance(table, Mapping) else getattr(table, "generator", None)
-    return "existing" if generator is None else str(generator)
-
-
-def _gather(table: Any) -> Any:
-    """Return the table with a generator's parameters in a table of their own."""
-    if not isinstance(table, Mapping) or "generator" not in table:
-        return table
-    common = {key: table[key] for key in ("generator", "degree") if key in table}
-    parameters = {key: value for key, value in table.items() if key not in common}
-    for key, value in parameters.items():
-        if isinstance(value, str):  # the generators' records would convert "3" to 3
-            raise ValueError(f"{key}: expected a number, not {value!r}")
-    return common | {"parameters": parameters}
+def _one_source(mesh: Any) -> Any:
+    if isinstance(mesh, Mapping) and ("file" in mesh) == ("generator" in mesh):
+        raise ValueError("give one of file and generator")
+    return mesh
 
 
 Mesh = Annotated[
-    Annotated[MeshFile, Tag("existing")]
-    | Annotated[VaneClusterMesh, Tag("vane_cluster")]
-    | Annotated[BlockMesh, Tag("block")]
-    | Annotated[SectorMesh, Tag("sector")],
-    Discriminator(_kind),
-    BeforeValidator(_gather),
+    Annotated[MeshFile, Tag("a file")] | Annotated[Generated, Tag("a generator")],
+    Discriminator(_source),
+    BeforeValidator(_one_source),
 ]
 
 
@@ -470,7 +397,7 @@ class Case:
             raise ValueError("modes.min_frequency: modes with the gyroscopic coupling are the lowest; leave it out")
         if self.ring is not None and self.rotation is not None and (self.ring.axis or self.ring.point):
             raise ValueError("ring.axis: a ring that rotates has the axis of [rotation]; leave out axis and point")
-        meshed = self.mesh.parameters.sectors if isinstance(self.mesh, SectorMesh) else None
+        meshed = self.mesh.sectors if isinstance(self.mesh, Sector) else None
         if self.ring is not None and meshed not in (None, self.ring.sectors):
             raise ValueError(f"ring.sectors: the mesh is a sector of {meshed}, not of {self.ring.sectors}")
         if self.mistuning is not None and self.ring is None:
@@ -489,12 +416,10 @@ class Case:
     def load(cls, path: str | Path) -> Case:
         """Read the case in a TOML file; a mesh file is relative to it. Raises InputError, for absurd units too."""
         data = read_toml(path)
-        mesh = data.get("mesh")
-        if isinstance(mesh, dict):
-            _check_mesh(mesh, path)
-        for keys in FILES:
-            _find_file(data, keys, path)
+        missing = [told for keys in FILES if (told := _find_file(data, keys, path))]
         case = validate(cls, data, str(path))
+        if missing:
+            raise InputError(f"{path}: {missing[0]}")
         for group, table in case.material.items():
             absurd = absurdity(table.young, table.density)
             if absurd is not None:
@@ -647,8 +572,8 @@ def _check_materials(materials: Mapping[str, MaterialTable], reference: float) -
             )
 
 
-def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) -> None:
-    """Resolve a file name relative to the case, and check that the file exists."""
+def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) -> str:
+    """Resolve a file name relative to the case; return what is wrong if there is no such file, else ""."""
     table: Any = data
     for key in keys[:-1]:
         table = table.get(key) if isinstance(table, dict) else None
@@ -657,31 +582,8 @@ def _find_file(data: dict[str, Any], keys: tuple[str, ...], path: str | Path) ->
         table[keys[-1]] = str(Path(path).parent / name)
         if not Path(table[keys[-1]]).is_file():
             remedy = "; `vanedamp mesh` writes one" if keys[0] == "mesh" else ""
-            raise InputError(f"{path}: {'.'.join(keys)}: no such file {table[keys[-1]]}{remedy}")
-
-
-def _check_mesh(mesh: dict[str, Any], path: str | Path) -> None:
-    """Reject wrong mesh tables with clearer messages than those of the union of records."""
-    generator, file = mesh.get("generator"), mesh.get("file")
-    if (generator is None) == (file is None):
-        raise InputError(f"{path}: mesh: give one of file and generator")
-    keys = ["file", "degree", "scale"]
-    if generator is not None:
-        if str(generator) not in GENERATORS:
-            raise InputError(
-                f"{path}: mesh.generator: no generator {generator!r}; {nearest(str(generator), list(GENERATORS))}"
-            )
-        keys = ["generator", "degree", *_names(GENERATORS[str(generator)])]
-    for key in mesh:
-        owners = [f'generator = "{name}"' for name, record in GENERATORS.items() if key in _names(record)]
-        if key not in keys and generator is None and owners:
-            raise InputError(f"{path}: mesh.{key}: belongs to {' or '.join(owners)}, not to a file")
-        if key not in keys:
-            raise InputError(f"{path}: mesh.{key}: unknown key; {nearest(key, keys)}")
-
-
-def _names(record: Any) -> list[str]:
-    return [item.name for item in fields(record)]
+            return f"{'.'.join(keys)}: no such file {table[keys[-1]]}{remedy}"
+    return ""
 
 
 def _check_group(key: str, group: str, by_kind: Mapping[str, list[str]]) -> None:

@@ -61,6 +61,7 @@ class RingJob(CaseJob):
         modes = ring_analysis(structure)
         diagram = ring_interference(structure, modes, self.operating, self.orders, means.report, means.checkpoint)
         warnings, files, data = list(unit_doubts(structure)), _files(structure, diagram), dict[str, Any]()
+        warnings += () if diagram.campbell is None else diagram.campbell.warnings
         study = None
         if self.case.mistuning is not None:
             study, doubts = self._study(structure, diagram)

@@ -37,7 +37,7 @@ class Changes:
         """Take the paths of variables by name, tolerances, and numbers that the scene has by default."""
         self._widths, data = widths, scene.to_dict()
         for path, value in missing.items():
-            assign(data, path.split("."), value, path)
+            assign(data, path, value)
         paths = {**variables, **{name: width.path for name, width in widths.items()}}
         numbers = {name: tuple(places(data, path)) for name, path in paths.items()}
         known, chosen = dict[tuple[str, ...], tuple[str, ...]](), set[str]()

@@ -56,7 +56,7 @@ def system_of(scene: Scene, values: Mapping[str, Any], parameter: str) -> dict[s
     data = {name: table for name, table in scene.to_dict().items() if name not in _ABOUT_RUNS}
     try:
         for path, value in (*values.items(), (parameter, None)):
-            assign(data, path.split("."), value, path)
+            assign(data, path, value)
     except InputError:
         return None
     data["damper"] = [

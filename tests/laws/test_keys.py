@@ -9,7 +9,6 @@ from functools import cache
 
 import pytest
 from jsonschema import Draft202012Validator
-from pydantic.dataclasses import is_pydantic_dataclass
 
 from vanedamp.files.reference import schema
 from vanedamp.files.toml_input import InputError, validate
@@ -39,14 +38,14 @@ def records():
     while left:
         record = left.pop()
         hints = typing.get_type_hints(record, include_extras=True)
-        if record.__name__ in found or "generator" in hints:  # which has the keys of its parameters as well
+        if record.__name__ in found:
             continue
         found[record.__name__] = record
         left += [
             each
             for field in dataclasses.fields(record)
             for each in parts(hints[field.name])
-            if isinstance(each, type) and is_pydantic_dataclass(each)
+            if isinstance(each, type) and hasattr(each, "__pydantic_config__")
         ]
     return found
 

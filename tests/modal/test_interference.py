@@ -1,11 +1,22 @@
 """Engine orders and modes of a ring: the diameters that they excite, and where they meet."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.tools.plate_rings import plate_waves
-from vanedamp.modal.records.campbell import OrderCrossing
+from vanedamp.modal.records.campbell import Campbell, OrderCrossing
 from vanedamp.modal.records.interference import Interference
+
+
+def over_speed(modes, crossings):
+    """A Campbell diagram of a ring's modes at two speeds."""
+    nothing, speeds = np.zeros(2), [0.0, 500.0]
+    return Campbell(
+        speeds, [True, True], np.arange(len(modes)), np.ones((len(modes), 2)), nothing, speeds, (2.0,), crossings, (),
+        diameters=modes.diameters, families=modes.families,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("sectors", [8, 9])
@@ -54,9 +65,23 @@ def test_meetings_of_a_campbell_diagram():
     crossings = tuple(
         OrderCrossing(mode, 2.0, speed, speed / np.pi) for mode, speed in ((2, 100.0), (3, 250.0), (2, 400.0))
     )
-    found = Interference(plate_waves(8), operating=(200.0, 300.0), speeds=[0.0, 500.0],
-                            over_speed_hz=np.ones((10, 2)), crossings=crossings)  # fmt: skip
+    found = Interference(plate_waves(8), operating=(200.0, 300.0), campbell=over_speed(plate_waves(8), crossings))
     assert found.meetings == crossings and found.in_operation == crossings[1:2]
+
+
+def test_the_diagram_has_the_modes_of_the_ring():
+    """Curves in another order, one more and one less: rows and crossings belong to diameter and family."""
+    modes, order = plate_waves(8), np.array([4, 2, 7, 0, 1, 3, 5, 6, 8])
+    crossings = tuple(OrderCrossing(curve, 2.0, 10.0 + curve, 3.0) for curve in (1, 9, 0))
+    curves = np.append(10.0 * order, 1e3)
+    diagram = replace(
+        over_speed(modes, crossings), modes=np.arange(10), diameters=np.append(modes.diameters[order], 9),
+        families=np.append(modes.families[order], 0), frequencies_hz=np.column_stack([curves, curves + 1.0]),
+    )  # fmt: skip
+    found = Interference(modes, campbell=diagram)
+    expected = np.append(10.0 * np.arange(9), np.nan)
+    np.testing.assert_array_equal(found.over_speed_hz, np.column_stack([expected, expected + 1.0]))
+    assert [(each.mode, each.speed) for each in found.crossings] == [(2, 11.0), (4, 10.0)]
 
 
 def test_waves_that_turn_apart_are_met_by_their_own_orders():
@@ -74,10 +99,10 @@ def test_waves_that_turn_apart_are_met_by_their_own_orders():
 
 def test_file_keeps_it(tmp_path):
     modes = plate_waves(8)
-    given = Interference(modes, [3, 5], speed=200.0, operating=(190.0, 210.0), speeds=[0.0, 100.0],
-                            over_speed_hz=np.ones((10, 2)), crossings=(OrderCrossing(2, 3.0, 60.0, 28.6),))  # fmt: skip
+    diagram = over_speed(modes, (OrderCrossing(2, 3.0, 60.0, 28.6),))
+    given = Interference(modes, [3, 5], speed=200.0, operating=(190.0, 210.0), campbell=diagram)
     given.save(tmp_path / "ring.h5")
     found = Interference.load(tmp_path / "ring.h5")
-    assert found.to_json() == given.to_json() and found.orders == (3, 5)
+    assert found.to_json() == given.to_json() and found.orders == (3, 5) and found.crossings == diagram.crossings
     modes.save(tmp_path / "bare.h5")
     assert Interference.load(tmp_path / "bare.h5").to_json() == Interference(modes).to_json()

@@ -24,7 +24,7 @@ def exact_scene(scene: Scene, changes: Mapping[str, mp.mpf]) -> SimpleNamespace:
     """Return a scene of sliders without rotation, with numbers at dotted paths changed by differences."""
     data = _exact(scene.to_dict())
     for path, change in changes.items():
-        assign(data, path.split("."), _at(data, path) + change, path)
+        assign(data, path, _at(data, path) + change)
     found = _Table(**{
         name: [_Table(**each) for each in table] if isinstance(table, list) else _Table(**table)
         for name, table in data.items()

@@ -1,9 +1,11 @@
 """Scene files: every mistake gets one line that names the key and the remedy."""
 
 import copy
+import re
 
 import pytest
 
+from vanedamp.coupling.scene.paths import number_at
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.files.toml_input import InputError, validate
@@ -92,6 +94,17 @@ def test_replace_by_dotted_path():
         scene.replace({"excitation.frequenc": 1.0})
     with pytest.raises(InputError, match=r"excitation.frequency.0: no table holds '0'; leave it out"):
         scene.replace({"excitation.frequency.0": 1.0})
+
+
+def test_numbers_that_are_not_there_are_named():
+    data = {"damper": [{"mass": 1.0}, {"mass": 1.0}], "stop": [], "rotation": {"point": [0.0, 1.0]}}
+    assert number_at(data, "damper.mass") == 1.0
+    for path, told in {
+        "damper.mas": "the scene holds no 'mas' there; did you mean 'mass'?", "stop.gap": "names no number",
+        "damper.0": "names a table, not a value", "rotation.point.0": "no table holds '0'; leave it out",
+    }.items():  # fmt: skip
+        with pytest.raises(InputError, match=re.escape(f"scene: {path}: {told}")):
+            number_at(data, path)
 
 
 def test_sweep_is_the_product_of_its_axes():

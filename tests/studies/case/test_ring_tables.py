@@ -110,7 +110,7 @@ def test_separate_structures_are_coupled_by_springs(tmp_path):
         (
             'high = "high"\n',
             'high = "high"\n[[ring.spring]]\nlow = "low"\nhigh = "low"\nstiffness = 1e6\n',
-            "ring.spring[0]: high: expected another group than low, 'low'",
+            "ring: spring[0].high: expected another group than low, 'low'",
         ),
         (
             'high = "high"\n',

@@ -36,10 +36,10 @@ def test_mesh_is_found_beside_the_case(tmp_path):
 
 def test_generators_take_their_parameters(tmp_path):
     case = load(FREE_BLOCK, tmp_path)
-    assert case.mesh.parameters.divisions == (6, 2, 1)
+    assert case.mesh.divisions == (6, 2, 1)
     assert case.mesh.degree == 2
     cluster = load(changed(CLUSTER, (f'file = "{SHIPPED}"', 'generator = "vane_cluster"\nairfoils = 3')), tmp_path)
-    assert cluster.mesh.parameters.airfoils == 3
+    assert cluster.mesh.airfoils == 3
 
 
 @pytest.mark.parametrize(
@@ -208,13 +208,20 @@ def test_bad_input_is_one_line_with_the_key(old, new, message, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('"block"', '"blok"', "mesh.generator: no generator 'blok'; did you mean 'block'?"),
-        ('"block"', "[1]", "mesh.generator: no generator [1]; known: block, sector, vane_cluster"),
+        ('"block"', '"blok"', "mesh.generator: must be one of 'vane_cluster', 'block', 'sector'"),
+        ('"block"', "[1]", "mesh.generator: must be one of 'vane_cluster', 'block', 'sector'"),
         ("thickness = 0.01", "thikness = 0.01", "mesh.thikness: unknown key; did you mean 'thickness'?"),
         ("thickness = 0.01", "thickness = -0.01", "mesh: thickness: expected a positive number of metres"),
-        ("thickness = 0.01", 'thickness = "3"', "mesh: thickness: expected a number, not '3'"),
+        ("thickness = 0.01", 'thickness = "3"', "mesh.thickness: should be a valid number (got '3')"),
         ("thickness = 0.01\n", "", "mesh.thickness: missing"),
         ("[6, 2, 1]", "[6, 2, 1.5]", "mesh.divisions[2]: should be a valid integer"),
+        ("[6, 2, 1]", "[6, 2, 1]\norder = true", "mesh.order: should be a valid integer (got True)"),
+        (
+            "[6, 2, 1]",
+            "[6, 2, 1]\nspan = 2",
+            'mesh.span: belongs to generator = "vane_cluster", not to generator',
+        ),
+        ("length = 0.1", "length = 1e300", "mesh.length: expected a number up to 1e+40 in SI units (got 1e+300)"),
     ],
 )
 def test_bad_generator_parameters(old, new, message, tmp_path):

@@ -7,6 +7,7 @@ import pytest
 
 import vanedamp as vd
 from tests.tools.plate_rings import mesh_variables, plate_waves, sector_mesh
+from vanedamp.modal.records.campbell import Campbell
 from vanedamp.modal.records.interference import Interference
 from vanedamp.studies.cli import main
 from vanedamp.studies.kinds.ring_modes import view as module
@@ -28,8 +29,11 @@ def found(modes):
     speeds = np.array([0.0, 200.0, 400.0])
     over = np.sqrt(modes.frequencies_hz[:, None] ** 2 + 2.0 * (speeds / (2 * np.pi)) ** 2)
     crossings = Interference(modes, operating=(100.0, 400.0)).meetings
-    return Interference(modes, range(1, 9), speed=150.0, operating=(140.0, 180.0), speeds=speeds,
-                           over_speed_hz=over, crossings=crossings)  # fmt: skip
+    diagram = Campbell(
+        speeds, np.ones(3, bool), np.arange(len(modes)), over, np.zeros(3), speeds, (1.0,), crossings, (),
+        diameters=modes.diameters, families=modes.families,
+    )  # fmt: skip
+    return Interference(modes, range(1, 9), speed=150.0, operating=(140.0, 180.0), campbell=diagram)
 
 
 @pytest.fixture

@@ -10,11 +10,11 @@ import numpy as np
 
 from vanedamp.files.formats.meshes.msh_header import read_header
 from vanedamp.files.toml_input import tables
-from vanedamp.meshes.parameters import expected_elements
+from vanedamp.meshes.parameters import VaneCluster, expected_elements
 from vanedamp.modal.mesh_import import group_names
 from vanedamp.modal.msh import checked_file
 from vanedamp.modal.units import material_doubts, size_doubts
-from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile, VaneClusterMesh
+from vanedamp.studies.case.tables import Case, MaterialTable, MeshFile
 from vanedamp.studies.facts import Fact
 
 #: elements of degree 2 in the length of a shear wave that show its mode to a per cent
@@ -61,9 +61,9 @@ def _of_mesh(case: Case) -> Iterator[Fact]:
                 yield Fact("extent", mesh.scale * header.extent, "m", "largest, along an axis")
     else:
         yield Fact("mesh", f"generator {mesh.generator}")
-        if isinstance(mesh, VaneClusterMesh):
-            size = mesh.parameters.element_size
-            yield Fact("elements", round(expected_elements(size, mesh.parameters.volume)), "", "roughly")
+        if isinstance(mesh, VaneCluster):
+            size = mesh.element_size
+            yield Fact("elements", round(expected_elements(size, mesh.volume)), "", "roughly")
             yield Fact(
                 "resolved_hz", slowest / (_IN_A_WAVE * size), "Hz", f"{_IN_A_WAVE} elements in a shear wave up to there"
             )
