@@ -20,7 +20,7 @@ from vanedamp.studies.case.tables import Case
 from vanedamp.studies.design.record import DesignRecord, measurement, sentence_of, words_of
 from vanedamp.studies.design.scenes import LEVELS, PLAIN, Device, Devices, plain_model
 from vanedamp.studies.design.tables import DesignFile
-from vanedamp.studies.design.verdict import LIFE, SPOTS, WORST, SpotFacts, held, overall
+from vanedamp.studies.design.verdict import GREEN, LIFE, SPOTS, WORST, SpotFacts, held, overall
 from vanedamp.studies.design.worst import Confirmation, confirm, screened
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.life.record import LifeRecord
@@ -221,7 +221,7 @@ def decided(
     values = held(study, best, life, spot_facts(devices.rom))
     grade = overall(values)
     by_number = dict(best.by_number())
-    failing = [value for value in values if value.grade not in ("", "green")]
+    failing = [value for value in values if value.grade == grade and grade != GREEN]
     case = source.parent / study.case
     files = [source, case, *map(Path, Case.load(case).files)]
     return DesignRecord(

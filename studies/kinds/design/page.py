@@ -46,12 +46,18 @@ def shown(file: str, record: DesignRecord, page: Page) -> dict[str, Any]:
     """Return the parts of the sheet."""
     rows = zip(record.frequency, *(getattr(record, field) for field in _CURVES.values()), strict=True)
     chart = page.chart("design", dressed(figure(record), height=380), ("frequency", *_CURVES.values()), rows, [file])
-    at = {NAMES[path]: value for path, value in record.at.items() if path in NAMES}
+    at = [_number(path, value) for path, value in record.at.items() if path in NAMES]
     return {
         "record": record, "file": file, "chart": chart, "picture": _picture(Path(file).with_name(MODES)),
         "rows": [_row(value) for value in record.held], "at": at, "drawing": _drawing(record),
         "sensitive": [(NAMES[path], added / record.held[0].value) for path, added in record.by_number.items()],
     }  # fmt: skip
+
+
+def _number(path: str, value: float) -> str:
+    """Return a number of a draw with its name and unit."""
+    unit, factor = {"gap": (" µm", 1e6), "mass": (" g", 1e3), "orientation": ("°", 1.0)}.get(NAMES[path], ("", 1.0))
+    return f"{NAMES[path]} {factor * value:.4g}{unit}"
 
 
 def _row(value: HeldValue) -> dict[str, Any]:
@@ -63,7 +69,7 @@ def _row(value: HeldValue) -> dict[str, Any]:
 
     low, high = text(value.low), text(value.high)
     interval = f"{low} to {high}" if low and high else f"from {low}" if low else f"up to {high}" if high else ""
-    margin = "" if value.margin is None else f"{value.margin:+.0%}"
+    margin = "" if value.margin is None else f"{value.margin:+.0%}" if value.margin < 10.0 else "more than 10 times"
     limit = "" if value.limit is None else f"{'at least' if value.least else 'at most'} {text(value.limit)}"
     return {
         "name": value.name, "unit": unit, "value": text(value.value), "interval": interval, "due": value.due,
