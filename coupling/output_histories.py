@@ -17,7 +17,7 @@ from vanedamp.coupling.system.reduced_model_file import reduced_model
 from vanedamp.files.toml_input import InputError
 
 
-class History(NamedTuple):
+class OutputHistory(NamedTuple):
     """Samples of outputs: time (t,) s, values (p, t) in the outputs' units; status: the run's."""
 
     time: np.ndarray
@@ -25,7 +25,7 @@ class History(NamedTuple):
     status: Status
 
 
-def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 100) -> History:
+def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 100) -> OutputHistory:
     """Return the named outputs of a scene's reduced model over one run, from time zero.
 
     The contribution of a massless boundary's own yielding is left out. Raises InputError for a structure that is no
@@ -47,4 +47,4 @@ def histories(scene: Scene, outputs: Sequence[str], samples_per_period: int = 10
             raise InputError(f"solver.method: {scene.solver.method} keeps no samples of modal coordinates")
         coordinates = np.zeros((0, model.size))
     rows = model.output_rows[[model.outputs.index(name) for name in outputs]] @ model.natural[1]
-    return History(response.time, rows @ coordinates.T, response.status)
+    return OutputHistory(response.time, rows @ coordinates.T, response.status)

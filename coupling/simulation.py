@@ -1,4 +1,4 @@
-"""A scene in, a response out: resolve what is "auto", then run the scene with its method (methods.registry)."""
+"""A scene in, a response out: resolve "auto", then run the scene with its method (methods.registry)."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def simulate(
     """Run a scene, or the one in a TOML file, from time zero over `scene.time.simulated` excitation periods.
 
     events: keep the list of events; samples_per_period: keep that many equidistant samples of each period; start: the
-    state that another run has left (`Response.final`), in place of the scene's initial one, where the method can;
-    progress: called with the number of periods done and of those to do; moved_start: run a second time, from bodies
+    state that another run has left (`Response.final`), instead of the scene's initial one, where the method can;
+    progress: called with periods done and to do; moved_start: run a second time, from bodies
     about 1e-9 of their gap aside, and say in `Response.moved_start`, and a warning, whether the mean amplitude differs.
     Raises InputError for a scene that the model does not allow; numerical failure is a status of the response.
     """
@@ -53,7 +53,7 @@ def simulate(
 
 
 def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0) -> list[Observer]:
-    """Return what a run keeps of a scene without open choices; arguments as in `simulate`."""
+    """Return the observers of a scene without open choices; arguments as in `simulate`."""
     return [
         WALLS,
         samples(samples_per_period),
@@ -64,13 +64,13 @@ def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0
 
 
 def parts_of_run(scene: Scene, samples_per_period: int = 0) -> list[Observer]:
-    """Return what keeps the parts that quantities of a run need; samples_per_period: that others keep."""
+    """Return the observers for quantities of a run; samples_per_period: of others."""
     spots = spots_of(scene)
     return [*parts_of(scene), *([] if spots is None else [StressObserver(spots, samples_per_period)])]
 
 
 def parts_of(scene: Scene) -> list[Observer]:
-    """Return what keeps the parts that quantities of any motion of a scene need: wear, sectors, contact strength."""
+    """Return the observers for quantities of any motion of a scene: wear, sectors, contact strength."""
     return [
         *([] if scene.wear is None else [wear(scene)]),
         *([sectors(scene)] if isinstance(scene.structure, Ring) else []),
@@ -91,7 +91,7 @@ def _from_moved(
         return {}
     places = moved(scene, scene.positions if start is None else start.slip.tolist())
     if start is None:
-        bodies = tuple(replace(body, position=place) for body, place in zip(scene.damper, places, strict=True))
+        bodies = tuple(replace(body, position=position) for body, position in zip(scene.damper, places, strict=True))
         scene = replace(scene, damper=bodies)
     else:
         start = replace(start, slip=frozen(places))

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.timing import Clock, in_turns, seconds
 from vanedamp.coupling.engine.amplitudes import amplitude_changes
-from vanedamp.coupling.engine.line.energy_balance import account
+from vanedamp.coupling.engine.line.energy_balance import end_segment
 from vanedamp.coupling.engine.line.event_driven import EngineRun, is_common
 from vanedamp.coupling.engine.line.event_functions import next_event
 from vanedamp.coupling.methods.registry import run_of
@@ -108,4 +108,4 @@ def _account(system: Any, flows: Any, st: Any, records: Any, scratch: Any, tau: 
     peak = records.peak[period]
     for _ in range(times):
         records.peak[period] = peak  # or the search for the peak would be needless the second time
-        account(system, flows, st, records, scratch, tau)
+        end_segment(system, flows, st, records, scratch, tau)

@@ -10,7 +10,7 @@ import itertools
 
 import numpy as np
 
-from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.assembly import Coordinates
 from vanedamp.coupling.system.line_system import LineSystem
 
 #: speeds, and differences of a force from its bound, that are zero
@@ -55,7 +55,7 @@ class Model:
         #: whether rigid contacts may stay closed, which needs friction or weight, or a base that pushes
         self.rests = bool(self.rubs) or bool(system.of_bodies.weight.any()) or not system.modes
 
-    def start(self, motion: Motion) -> np.ndarray:
+    def start(self, motion: Coordinates) -> np.ndarray:
         """Return u and its rate of a motion."""
         return np.r_[motion.q / self.size, motion.v / self.size / self.system.omega]
 

@@ -19,7 +19,7 @@ from benchmarks.methods.peers import DEEPEST, PeerRun, one_restitution
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import Motion, assemble
+from vanedamp.coupling.system.assembly import Coordinates, assemble
 from vanedamp.coupling.system.line_system import line_system
 from vanedamp.files.toml_input import InputError
 
@@ -50,7 +50,7 @@ def run(scene: Scene, periods: int, setting: float, samples: int) -> PeerRun:
 class _Run:
     """An integrator of a model."""
 
-    def __init__(self, model: Model, motion: Motion, tolerance: float) -> None:
+    def __init__(self, model: Model, motion: Coordinates, tolerance: float) -> None:
         import heyoka
 
         self.model, self.states, n = model, States(model), model.n

@@ -18,7 +18,7 @@ from vanedamp.coupling.methods.time_stepping import TimeGrid, time_grid
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import Motion, assemble
+from vanedamp.coupling.system.assembly import Coordinates, assemble
 from vanedamp.coupling.system.line_system import LineSystem, line_system
 from vanedamp.files.toml_input import InputError
 
@@ -112,7 +112,7 @@ class Coupled(NamedTuple):
 
     system: LineSystem
     times: TimeGrid
-    motion: Motion
+    motion: Coordinates
 
 
 def one_restitution(name: str, scene: Scene) -> None:
@@ -131,7 +131,7 @@ def coupled(scene: Scene, steps: int) -> Coupled:
     system, motion = line_system(whole), motion_of(whole, start_of(scene, whole))
     travel, size = np.where(np.isinf(system.spring), system.play, np.inf), len(system.mass)
     times = time_grid(scene, whole, steps)._replace(travel=travel)
-    return Coupled(system, times, Motion(motion.q[:size], motion.v[:size]))
+    return Coupled(system, times, Coordinates(motion.q[:size], motion.v[:size]))
 
 
 def tracked(equations: Coupled, q: np.ndarray, samples: int, seconds: float) -> PeerRun:

@@ -28,7 +28,7 @@ from benchmarks.rows import Rows
 from benchmarks.sweep.simulation import Costs, simulated
 from benchmarks.sweep.worker import Job, scene
 from benchmarks.timing import format_spread, spread
-from vanedamp.coupling.sweep.checkpoint import Checkpoint
+from vanedamp.coupling.sweep.checkpoint import SweepCheckpoint
 from vanedamp.files.store import write_json
 from vanedamp.studies.jobs.workers import available_cores
 
@@ -252,7 +252,7 @@ def _checkpoint() -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         for size in sizes:
             made, path = scene(size, 5), Path(folder, f"{size}.partial")
-            kept = Checkpoint(path, made, size, {})
+            kept = SweepCheckpoint(path, made, size, {})
             kept.finished.put(
                 np.arange(size), rng.normal(size=kept.finished.values.shape), np.zeros((size, 2), int), ["ok"]
             )

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.checkpoint import Checkpoint
+from vanedamp.coupling.sweep.checkpoint import SweepCheckpoint
 from vanedamp.coupling.sweep.grid import grid
 from vanedamp.coupling.sweep.row import Row
 from vanedamp.coupling.sweep.schedule import run_tasks
@@ -110,7 +110,7 @@ def _sweep(job: Job, pool: Executor | None) -> dict[str, Any]:
     warm_up()
     watched = None if pool is None else _Watched(pool)
     before = _uses(pool, job.workers)
-    resumed = Checkpoint(folder / "sweep.h5.partial", made, job.points, {}).finished.count
+    resumed = SweepCheckpoint(folder / "sweep.h5.partial", made, job.points, {}).finished.count
     started = time.perf_counter()
     result = sweep(made, watched, checkpoint=folder / "sweep.h5.partial")
     result.save(folder / "sweep.h5")

@@ -40,12 +40,12 @@ def speed_of_force(contact: Contact, mass: float, force: float) -> float:
 def spring(contact: Contact, mass: float, speed: float, match: str) -> float:
     """Return the stiffness, N/m, of the linear spring whose collision has the same largest "force" or "duration".
 
-    One spring has not both: for a point, k of the force is 1.371 times that of the duration at every speed.
+    For a point, k of the force is 1.371 times that of the duration at every speed.
     """
-    found = collision(contact, mass, speed)
+    impact = collision(contact, mass, speed)
     if match == "force":
-        return found.force**2 / (mass * speed**2)
-    return mass * (math.pi / found.duration) ** 2
+        return impact.force**2 / (mass * speed**2)
+    return mass * (math.pi / impact.duration) ** 2
 
 
 def _duration(contact: Line, mass: float, force: float) -> float:

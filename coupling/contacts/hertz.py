@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 _TOO_WIDE = "the strip of contact would be as wide as the bodies: a line of contact does not hold here"
-#: depths, in half widths of the contact, among which the most stressed place is looked for
+#: depths, in half widths of the contact, where the most stressed one is sought
 _DEPTHS = np.linspace(0.0, 3.0, 601)
 
 
@@ -172,10 +172,10 @@ def yield_pressure(poisson: float, along_line: bool) -> float:
 
     at = float(_DEPTHS[int(np.argmax(stress(_DEPTHS)))])
     step = float(_DEPTHS[1])
-    found = minimize_scalar(
+    peak = minimize_scalar(
         lambda z: -float(stress(z)), bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-9}
     )
-    return 1 / max(-float(found.fun), float(stress(at)))
+    return 1 / max(-float(peak.fun), float(stress(at)))
 
 
 def _of_point(nu: float) -> Callable[[float | np.ndarray], np.ndarray]:

@@ -30,7 +30,7 @@ UNITS = {
 
 @dataclass(frozen=True, repr=False)
 class ContactNumbers(Displayed):
-    """Collisions on a rounded contact without loss, and what is left of them where it yields; arrays over n speeds."""
+    """Collisions on a rounded contact without loss, and their remainder where it yields; arrays over n speeds."""
 
     name: str
     """what touches"""
@@ -84,7 +84,7 @@ def contact_numbers(
             yields = speed_of_force(contact, mass, force)
         low, high = speeds or (_SPEEDS if yields is None else (yields * _OVER_YIELD[0], yields * _OVER_YIELD[1]))
         grid = np.geomspace(low, high, _ROWS)
-        found = [collision(contact, mass, speed) for speed in grid.tolist()]
+        collisions = [collision(contact, mass, speed) for speed in grid.tolist()]
         springs = {
             f"stiffness_{match}": np.array([spring(contact, mass, speed, match) for speed in grid.tolist()])
             for match in ("force", "duration")
@@ -93,12 +93,12 @@ def contact_numbers(
         raise InputError(f"pair: {error}") from None
     columns = {
         "speed": grid,
-        "force": np.array([item.force for item in found]),
-        "duration": np.array([item.duration for item in found]),
-        "approach": np.array([item.approach for item in found]),
-        "pressure": np.array([contact.pressure(item.force) for item in found]),
+        "force": np.array([item.force for item in collisions]),
+        "duration": np.array([item.duration for item in collisions]),
+        "approach": np.array([item.approach for item in collisions]),
+        "pressure": np.array([contact.pressure(item.force) for item in collisions]),
         **springs,
-        "stiffness_tangent": np.array([contact.stiffness(item.force) for item in found]),
+        "stiffness_tangent": np.array([contact.stiffness(item.force) for item in collisions]),
     }
     models: tuple[Restitution, ...] = ()
     if first is not None and yields is not None and pair.yield_strength is not None:

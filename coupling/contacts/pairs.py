@@ -1,6 +1,6 @@
 """Measured friction and restitution of pairs, each with its conditions and source.
 
-Few, since only published measurements whose conditions are known are listed: others are no better than a guess.
+Few: only published measurements under known conditions are listed.
 """
 
 from __future__ import annotations

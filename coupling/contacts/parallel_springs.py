@@ -1,4 +1,4 @@
-"""A Hertzian contact as springs in parallel, each of which begins at a depth of its own: exact flow between events.
+"""A Hertzian contact as springs in parallel, each from its own depth: exact flow between events.
 
 Force and approach are vertices of a polygon. The energy of a segment with the stiffness k is the growth of F^2/(2 k).
 So the largest force of a collision with the energy E is right at the vertices if their areas are the energies of the
@@ -30,7 +30,7 @@ def parallel_springs(contact: Contact, force: float, count: int) -> tuple[Spring
 
     From the speed of this force down to a quarter of it: for a point, force within 0.9e-3 and duration within 0.3e-3
     with ten springs, proportional to (count - 2)^-2. Two springs make the energy and the approach of the lowest speed
-    right, the others a vertex each. Below, errors grow to those of one spring; above, the last stiffness stays.
+    right, the others a vertex each. Below, errors grow to one spring's; above, the last stiffness stays.
     Raises ValueError.
     """
     most = contact.energy(force)

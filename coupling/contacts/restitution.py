@@ -1,6 +1,6 @@
 """Restitution of spheres that yield, versus the speed of impact: by closed forms, each with its range of speeds.
 
-Elastic and perfectly plastic, without adhesion, rate or wave effects: upper bounds of what is left after an impact.
+Elastic and perfectly plastic, without adhesion, rate or wave effects: upper bounds of the rest after an impact.
 Below the speed of first yield a collision loses nothing here.
 """
 
@@ -36,8 +36,8 @@ def thornton(speed: np.ndarray | float, yield_speed: float) -> np.ndarray:
     """
     ratio = np.minimum(yield_speed / np.maximum(np.asarray(speed, float), yield_speed), 1.0)
     fraction = ratio / (ratio + 2 * np.sqrt(1.2 - 0.2 * ratio**2))
-    found = math.sqrt(1.2 * math.sqrt(3)) * np.sqrt(1 - ratio**2 / 6) * fraction**0.25
-    return np.asarray(np.where(ratio == 1.0, 1.0, found))
+    e = math.sqrt(1.2 * math.sqrt(3)) * np.sqrt(1 - ratio**2 / 6) * fraction**0.25
+    return np.asarray(np.where(ratio == 1.0, 1.0, e))
 
 
 def johnson(speed: np.ndarray | float, contact: Point, mass: float, yield_strength: float) -> np.ndarray:

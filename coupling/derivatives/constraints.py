@@ -28,17 +28,17 @@ from vanedamp.coupling.numerics.compiler.jit import counting, inlined
 from vanedamp.coupling.system.unit_kinematics import is_slip
 
 
-class Map(NamedTuple):
-    """The map M -> (places, rates) M + (0, own): matrices (N, N), own (2N, P)."""
+class AffineMap(NamedTuple):
+    """The map M -> (places, rates) M + (0, offset): matrices (N, N), offset (2N, P)."""
 
     places: np.ndarray
     rates: np.ndarray
-    own: np.ndarray
+    offset: np.ndarray
 
 
 @inlined
 def presses(state):
-    """Return whether a contact in a state is closed with a force of its own."""
+    """Return whether a contact in a state is closed with its own force."""
     return state < OPEN or state == CLOSED
 
 
@@ -46,34 +46,34 @@ def presses(state):
 def identity(room, eq, turns):
     """Return the map that changes nothing."""
     size = len(eq.root)
-    return Map(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.numbers))
+    return AffineMap(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.numbers))
 
 
 @counting
 def applied(room, map_, M):
     """Return the derivative (2N, k + P) after a map."""
-    size, P = len(map_.places), map_.own.shape[1]
-    found = matrix(room, 2 * size, M.shape[1])
-    add_product(found[:size], map_.places, M[:size])
-    add_product(found[size:], map_.rates, M[size:])
+    size, P = len(map_.places), map_.offset.shape[1]
+    image = matrix(room, 2 * size, M.shape[1])
+    add_product(image[:size], map_.places, M[:size])
+    add_product(image[size:], map_.rates, M[size:])
     first = M.shape[1] - P
     for i in range(2 * size):
         for p in range(P):
-            found[i, first + p] += map_.own[i, p]
-    return found
+            image[i, first + p] += map_.offset[i, p]
+    return image
 
 
 @counting
 def then(room, one, other):
     """Return a map and then another."""
     size = len(one.places)
-    own = matrix(room, 2 * size, one.own.shape[1])
-    add_product(own[:size], other.places, one.own[:size])
-    add_product(own[size:], other.rates, one.own[size:])
+    offset = matrix(room, 2 * size, one.offset.shape[1])
+    add_product(offset[:size], other.places, one.offset[:size])
+    add_product(offset[size:], other.rates, one.offset[size:])
     for i in range(2 * size):
-        for p in range(own.shape[1]):
-            own[i, p] += other.own[i, p]
-    return Map(product(room, other.places, one.places), product(room, other.rates, one.rates), own)
+        for p in range(offset.shape[1]):
+            offset[i, p] += other.offset[i, p]
+    return AffineMap(product(room, other.places, one.places), product(room, other.rates, one.rates), offset)
 
 
 @counting
@@ -83,7 +83,7 @@ def held(room, eq, turns, closed, stuck, z):
     Both sides move by forces between them only, which keep their momentum and their centre of mass.
     """
     size, units = len(eq.root), len(closed)
-    found, count, more = identity(room, eq, turns), 0, 0
+    map_, count, more = identity(room, eq, turns), 0, 0
     for r in range(units):
         count += closed[r]
         more += stuck[r]
@@ -103,38 +103,38 @@ def held(room, eq, turns, closed, stuck, z):
     on_places, on_rates = product(room, inverse, normal), product(room, of_both, both)
     for i in range(size):
         for k in range(size):
-            found.places[i, k] -= eq.rate[i] * on_places[i, k] / eq.rate[k]
-            found.rates[i, k] -= on_rates[i, k]
+            map_.places[i, k] -= eq.rate[i] * on_places[i, k] / eq.rate[k]
+            map_.rates[i, k] -= on_rates[i, k]
     for p in range(turns.numbers):
         for a in range(count):
             opened = dot(turns.gap[p, rows[a]], z)
             for i in range(size):
-                found.own[i, p] -= eq.rate[i] * inverse[i, a] * opened
+                map_.offset[i, p] -= eq.rate[i] * inverse[i, a] * opened
         for a in range(count + more):
             moved = dot(turns.rows[p, rows[a]], z[size:])
             for i in range(size):
-                found.own[size + i, p] -= of_both[i, a] * moved
-    return found
+                map_.offset[size + i, p] -= of_both[i, a] * moved
+    return map_
 
 
 @counting
 def followed(room, eq, turns, state, z):
-    """Return the map to sliders as they are in states (u,): those that slip follow what draws them, others rest."""
-    size, sliders, found = len(eq.root), len(eq.bound), identity(room, eq, turns)
+    """Return the map to sliders as they are in states (u,): slipping ones follow their drivers, others rest."""
+    size, sliders, map_ = len(eq.root), len(eq.bound), identity(room, eq, turns)
     for j in range(sliders):
         at, way = size - sliders + j, state[eq.jenkins + j]
         for k in range(size):
-            found.rates[at, k] = 0.0
+            map_.rates[at, k] = 0.0
         if way == STICK:
             continue
         for k in range(size):
-            found.places[at, k], found.rates[at, k] = eq.follows[j, k], eq.follows[j, size + k]
+            map_.places[at, k], map_.rates[at, k] = eq.follows[j, k], eq.follows[j, size + k]
         for p in range(turns.numbers):
-            found.own[at, p] = dot(turns.follows[p, j, :size], z)
+            map_.offset[at, p] = dot(turns.follows[p, j, :size], z)
             if is_slip(way):
-                found.own[at, p] -= way * turns.bound[p, j]
-            found.own[size + at, p] = dot(turns.follows[p, j, size:], z[size:])
-    return found
+                map_.offset[at, p] -= way * turns.bound[p, j]
+            map_.offset[size + at, p] = dot(turns.follows[p, j, size:], z[size:])
+    return map_
 
 
 @counting
@@ -151,50 +151,50 @@ def begun(room, eq, turns, state, closed, z):
 @counting
 def pressing(room, state):
     """Return whether units (u,) press, as contacts, in states."""
-    found = integers(room, len(state))
+    pressed = integers(room, len(state))
     for r in range(len(state)):
-        found[r] = 1 if presses(state[r]) else 0
-    return found
+        pressed[r] = 1 if presses(state[r]) else 0
+    return pressed
 
 
 @counting
 def left(room, eq, turns, M, z, rows, kind):
-    """Return what numbers and the start do to functionals at z (GAPS of contacts, or SPEEDS of rows): (m, k + P)."""
-    found = matrix(room, len(rows), M.shape[1])
+    """Return derivatives of functionals at z (GAPS of contacts, or SPEEDS of rows): (m, k + P)."""
+    derivative = matrix(room, len(rows), M.shape[1])
     for a in range(len(rows)):
-        _add_left(eq, turns, M, z, rows[a], kind, found[a])
-    return found
+        _add_left(eq, turns, M, z, rows[a], kind, derivative[a])
+    return derivative
 
 
 @counting
 def left_of(room, eq, turns, M, z, row, kind):
     """Return the same of one functional: (k + P,)."""
-    found = vector(room, M.shape[1])
-    _add_left(eq, turns, M, z, row, kind, found)
-    return found
+    derivative = vector(room, M.shape[1])
+    _add_left(eq, turns, M, z, row, kind, derivative)
+    return derivative
 
 
 @counting
-def _add_left(eq, turns, M, z, row, kind, found):
+def _add_left(eq, turns, M, z, row, kind, derivative):
     functional, first = eq.speed[row] if kind == SPEEDS else eq.gap[row], M.shape[1] - turns.numbers
     for i in range(M.shape[0]):
         if functional[i] != 0.0:
             for c in range(M.shape[1]):
-                found[c] += functional[i] * M[i, c]
+                derivative[c] += functional[i] * M[i, c]
     for p in range(turns.numbers):
-        found[first + p] += own_of(turns, p, row, z, kind)
+        derivative[first + p] += explicit_of(turns, p, row, z, kind)
 
 
 @inlined
-def own_of(turns, p, row, z, kind):
-    """Return what number p alone changes in a functional at z."""
+def explicit_of(turns, p, row, z, kind):
+    """Return the explicit change by number p of a functional at z."""
     return dot(turns.speed[p, row], z) if kind == SPEEDS else dot(turns.gap[p, row], z)
 
 
 @counting
 def largest(room, eq, M):
     """Return the largest entry of a derivative (2N, k + P) in units of the sizes of states."""
-    found, of_state = 0.0, vector(room, M.shape[1])
+    most, of_state = 0.0, vector(room, M.shape[1])
     for s in range(len(eq.scale)):
         for c in range(M.shape[1]):
             of_state[c] = 0.0
@@ -203,5 +203,5 @@ def largest(room, eq, M):
                 for c in range(M.shape[1]):
                     of_state[c] += eq.to_state[s, i] * M[i, c]
         for c in range(M.shape[1]):
-            found = max(found, abs(of_state[c]) / eq.scale[s])
-    return found
+            most = max(most, abs(of_state[c]) / eq.scale[s])
+    return most

@@ -6,7 +6,7 @@ squares of u, and every matrix has entries of the order of the frequencies. Betw
     z' = X z,    z = (u, size, size cos(omega_h t), size sin(omega_h t)),
 
 where loads and constants are columns of X. Gaps, slips and forces are functionals of z, so that their rates and second
-derivatives refer to z: whatever an event asks of its function is in one row.
+derivatives refer to z: an event function is one row.
 
 The accelerations are those of system.flow.
 """
@@ -46,7 +46,7 @@ def _size_of_loads(system: System, rate: np.ndarray) -> float:
     return float(np.abs(loads).max(initial=0.0) / rate.max(initial=0.0)) or 1.0
 
 
-class Dynamics:
+class ScaledDynamics:
     """Flows of a system with N coordinates by the states of its u units; K = 2N + 1 + 2e entries of z.
 
     scale: (k,) sizes of states; to_state, from_state: (k, 2N) and (2N, k) between u and states; rows: (2u, N) J in
@@ -57,7 +57,7 @@ class Dynamics:
     size serve here, too, so that both compare.
     """
 
-    def __init__(self, frame: Frame, scale: np.ndarray, like: Dynamics | None = None) -> None:
+    def __init__(self, frame: Frame, scale: np.ndarray, like: ScaledDynamics | None = None) -> None:
         self.frame, self.system = frame, frame.system
         system = self.system
         size, u, e = len(system.mass), len(system.rest), len(system.frequency)
@@ -115,7 +115,7 @@ class Dynamics:
 
     @cached_property
     def part(self) -> np.ndarray:
-        """Numbers (N,) of the parts of the system that do not feel each other."""
+        """Numbers (N,) of the parts of the system that are not coupled."""
         system = self.system
         bound = np.vstack([system.J, system.elongation]) != 0.0
         joined = (system.stiffness != 0.0) | (system.damping != 0.0) | (bound.T @ bound)
@@ -148,7 +148,7 @@ class Flow:
     slip of a unit that counts as slipping.
     """
 
-    def __init__(self, dynamics: Dynamics, state: np.ndarray, open_force: np.ndarray) -> None:
+    def __init__(self, dynamics: ScaledDynamics, state: np.ndarray, open_force: np.ndarray) -> None:
         self.dynamics, self.state, self.solved = dynamics, state, StateFlow(dynamics.system, state, 0.0)
         solved, per = self.solved, dynamics.per
         self.rubs, self.way, self.stuck, self.slips_held = solved.rubs, solved.way, solved.stuck, solved.held
@@ -160,7 +160,7 @@ class Flow:
 
     @cached_property
     def possible_forces(self) -> np.ndarray:
-        """The largest forces (2u,) that hold, by loads as large as those of a typical motion in any direction."""
+        """The largest forces (2u,) that hold, by loads of a typical motion's size in any direction."""
         loads = np.linalg.norm(np.abs(self.free) @ self.dynamics.typical)
         return np.asarray(np.abs(self.solved.spread(np.linalg.norm(self.solved.carried, axis=1) * loads)))
 
@@ -171,7 +171,7 @@ class Flow:
 
     @cached_property
     def key(self) -> bytes:
-        """What tells these from others."""
+        """The key of these states."""
         return self.named.tobytes()
 
     @cached_property
@@ -190,8 +190,8 @@ class Flow:
         """The functionals (m, K) of the possible events, each relative to its scale, and their rates."""
         dynamics, system, one = self.dynamics, self.dynamics.system, np.zeros(len(self.X))
         margins, one[dynamics.one] = np.zeros((len(self.possible), len(self.X))), 1.0 / dynamics.size
-        for margin, (r, what) in zip(margins, self.possible, strict=True):
-            event, signals = EVENTS[what], signals_of(r, dynamics.gap, dynamics.speed, self.forces, one)
+        for margin, (r, code) in zip(margins, self.possible, strict=True):
+            event, signals = EVENTS[code], signals_of(r, dynamics.gap, dynamics.speed, self.forces, one)
             functional, scale = event.function(event.factors(system, r, self.way[r]), signals), event.size(system, r)
             typical = float(np.abs(functional) @ dynamics.typical)
             margin[:] = functional / (scale if np.isfinite(scale) else typical or 1.0)
@@ -205,6 +205,6 @@ class Flow:
 
 @lru_cache(_KEPT)
 def _parts(joined: bytes, size: int) -> np.ndarray:
-    """Return numbers (size,) of the parts of what is joined, (size, size) as bytes: the same for many systems."""
-    found = connected_components(np.frombuffer(joined, bool).reshape(size, size), directed=False)[1]
-    return frozen(found, int)
+    """Return component labels (size,) of a graph (size, size) in bytes, the same for many systems."""
+    labels = connected_components(np.frombuffer(joined, bool).reshape(size, size), directed=False)[1]
+    return frozen(labels, int)

@@ -1,4 +1,4 @@
-"""The equations of a system as compiled functions take them: of Dynamics, of its numbers, and of the flows met.
+"""The equations of a system as compiled functions take them: of ScaledDynamics, of its numbers, and of the flows met.
 
 N coordinates, u units, K entries of z, k states, j sliders of Jenkins elements, e harmonics, b bodies; P numbers by
 which there are derivatives, k + P columns of these.
@@ -10,8 +10,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import Dynamics
-from vanedamp.coupling.derivatives.numbers import Numbers
+from vanedamp.coupling.derivatives.dynamics import ScaledDynamics
+from vanedamp.coupling.derivatives.numbers import Parameters
 from vanedamp.coupling.numerics.compiler.record import record, record_with
 from vanedamp.coupling.system.system import FLOOR
 from vanedamp.coupling.system.unit_laws import EVENTS, contacts_of, rubs
@@ -27,14 +27,14 @@ _TERMS = 3
 
 @record_with(free_axes=2)
 class Equations(NamedTuple):
-    """What Dynamics and its system say, in the same scales."""
+    """ScaledDynamics and its system, in the same scales."""
 
     modes: int
     contacts: int
     jenkins: int  # the first unit that is one
     two_phases: bool
     law: bool  # whether restitutions depend on speeds
-    parts: int  # of the system that do not feel each other
+    parts: int  # of the system that are not coupled
     in_line: bool  # whether no body has a tilt
     size: float  # of constants and harmonics in z
     period: float
@@ -79,8 +79,8 @@ class Equations(NamedTuple):
 
 
 @record_with(free_axes=3)
-class Turns(NamedTuple):
-    """What P numbers change in the equations, times their sizes (derivatives.numbers.Parts)."""
+class EquationTangents(NamedTuple):
+    """Derivatives of the equations by P numbers, times their sizes (derivatives.numbers.EquationArrays)."""
 
     numbers: int
     root: np.ndarray
@@ -102,8 +102,8 @@ class Turns(NamedTuple):
 
 
 @record
-class Flows(NamedTuple):
-    """Flows (f) that a motion has met, by the states of the units; empty places have no entries.
+class FlowStack(NamedTuple):
+    """Flows (f) that a motion has met, by the states of the units; empty indices have none.
 
     x: n entries of X at row and column; d: those of its derivatives by a number, at rows `to` and columns `of`;
     margin, slope: m functionals of possible events and their rates (dynamics.Flow), possible: their units and codes.
@@ -134,7 +134,7 @@ class Flows(NamedTuple):
     slope: Annotated[np.ndarray, "f m K"]
 
 
-def equations_of(dynamics: Dynamics) -> Equations:
+def equations_of(dynamics: ScaledDynamics) -> Equations:
     """Return the equations of a system by its dynamics."""
     d, system = dynamics, dynamics.system
     unit, codes = np.arange(len(system.rest)), max(EVENTS) + 1
@@ -148,7 +148,7 @@ def equations_of(dynamics: Dynamics) -> Equations:
         for place, name in enumerate(event.scale):
             scaled[code, place] = _SCALES.index(name)
     cavities = [d.frame.scene.cavity[index] for index in system.cavity]
-    own = {
+    arrays = {
         "modes": system.modes, "contacts": system.contacts, "jenkins": len(unit) - len(system.tangential),
         "parts": int(d.part.max(initial=-1)) + 1, "part": d.part, "two_phases": bool(system.two_phases),
         "law": bool(system.restitution_at), "size": float(d.size),
@@ -158,7 +158,7 @@ def equations_of(dynamics: Dynamics) -> Equations:
         "travel": np.array([cavity.gap for cavity in cavities], float), "longest": d.frame.longest,
         "order": order, "terms": terms, "factor": factor, "scaled": scaled,
     }  # fmt: skip
-    known = system._asdict() | vars(d) | own
+    known = system._asdict() | vars(d) | arrays
     return Equations(*(_plain(known[name]) for name in Equations._fields))
 
 
@@ -166,12 +166,14 @@ def equations_of(dynamics: Dynamics) -> Equations:
 _SCALES = ("play", "spring", "limit")
 
 
-def turns_of(dynamics: Dynamics, numbers: Numbers | None) -> Turns:
-    """Return what numbers change; None: no number."""
+def turns_of(dynamics: ScaledDynamics, numbers: Parameters | None) -> EquationTangents:
+    """Return derivatives by numbers; None: no number."""
     if numbers is not None:
-        return Turns(len(numbers), *(_plain(getattr(numbers.parts, name)) for name in Turns._fields[1:]))
+        return EquationTangents(
+            len(numbers), *(_plain(getattr(numbers.parts, name)) for name in EquationTangents._fields[1:])
+        )
     known = dynamics.system._asdict() | vars(dynamics)
-    return Turns(0, *(np.zeros((0, *np.shape(known[name]))) for name in Turns._fields[1:]))
+    return EquationTangents(0, *(np.zeros((0, *np.shape(known[name]))) for name in EquationTangents._fields[1:]))
 
 
 def _plain(value: Any) -> Any:

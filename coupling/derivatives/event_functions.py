@@ -1,4 +1,4 @@
-"""Event functions of units as functionals of z, and what numbers change in them (system.unit_laws)."""
+"""Event functions of units as functionals of z, and their derivatives by numbers (system.unit_laws)."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ TANGENTIAL = 1e-12
 
 
 class Guards(NamedTuple):
-    """Event functions (g) right before an event: its own first, then those of others at the same time.
+    """Event functions (g) right before an event: its own first, then simultaneous ones.
 
-    gradient: (g, 2N) by u; own: (g, P) by numbers, where the motion stays; rate, bend: (g,) first and second
+    gradient: (g, 2N) by u; explicit: (g, P) by numbers, where the motion stays; rate, bend: (g,) first and second
     derivatives in time; scale: (g,); part: (g,) of the system (Dynamics.part), `parts` of none; flight: (g,) time since
     the unit last took part in an event, s.
     """
 
     gradient: np.ndarray
-    own: np.ndarray
+    explicit: np.ndarray
     rate: np.ndarray
     bend: np.ndarray
     scale: np.ndarray
@@ -47,20 +47,20 @@ class Guards(NamedTuple):
 
 
 @kernel
-def generated(flows, f, z, found):
-    """Set found (K,) to X z."""
-    for i in range(len(found)):
-        found[i] = 0.0
+def generated(flows, f, z, rate):
+    """Set rate (K,) to X z."""
+    for i in range(len(rate)):
+        rate[i] = 0.0
     for n in range(flows.counts[f, 0]):
-        found[flows.row[f, n]] += flows.x[f, n] * z[flows.column[f, n]]
+        rate[flows.row[f, n]] += flows.x[f, n] * z[flows.column[f, n]]
 
 
 @inlined
-def factor_of(eq, r, way, code, place):
+def factor_of(eq, r, way, code, term):
     """Return the factor of a term of an event function of unit r, which slips in a direction, or 0."""
-    by = eq.terms[code, place, 1]
+    by = eq.terms[code, term, 1]
     if by == CONSTANT:
-        return eq.factor[code, place]
+        return eq.factor[code, term]
     if by == WAY:
         return way
     if by == FRICTION_FACTOR:
@@ -74,7 +74,7 @@ def factor_of(eq, r, way, code, place):
 
 @inlined
 def _turn_of_factor(turns, p, r, by):
-    """Return what number p changes in a factor."""
+    """Return the derivative of a factor by number p."""
     if by == FRICTION_FACTOR:
         return turns.friction[p, r]
     if by == LIMIT_FACTOR:
@@ -87,23 +87,23 @@ def _turn_of_factor(turns, p, r, by):
 
 
 @kernel
-def _add_signal(eq, flows, f, r, signal, factor, found):
+def _add_signal(eq, flows, f, r, signal, factor, functional):
     """Add a signal of unit r, times a factor, to a functional (K,)."""
     units = len(eq.rest)
     if signal == ONE:
-        found[len(eq.unit)] += factor / eq.size
+        functional[len(eq.unit)] += factor / eq.size
         return
     row = (
         eq.gap[r] if signal == GAP else eq.speed[r] if signal == RATE else eq.speed[units + r] if signal == SLIP
         else flows.forces[f, r] if signal == PUSH else flows.forces[f, units + r]
     )  # fmt: skip
-    for i in range(len(found)):
-        found[i] += factor * row[i]
+    for i in range(len(functional)):
+        functional[i] += factor * row[i]
 
 
 @inlined
 def _turn_of_signal(turns, flows, f, p, r, signal, z):
-    """Return what number p changes in a signal of unit r at z."""
+    """Return the derivative by number p of a signal of unit r at z."""
     units = turns.gap.shape[1]
     if signal == GAP:
         return dot(turns.gap[p, r], z)
@@ -121,48 +121,48 @@ def _turn_of_signal(turns, flows, f, p, r, signal, z):
 @counting
 def function_of(room, eq, flows, f, r, code):
     """Return the event function `code` of unit r in flow f: a functional (K,) that falls through zero at its event."""
-    found = vector(room, len(eq.typical))
-    for place in range(eq.terms.shape[1]):
-        if eq.terms[code, place, 0] >= 0:
-            factor = factor_of(eq, r, flows.way[f, r], code, place)
-            _add_signal(eq, flows, f, r, eq.terms[code, place, 0], factor, found)
-    return found
+    functional = vector(room, len(eq.typical))
+    for term in range(eq.terms.shape[1]):
+        if eq.terms[code, term, 0] >= 0:
+            factor = factor_of(eq, r, flows.way[f, r], code, term)
+            _add_signal(eq, flows, f, r, eq.terms[code, term, 0], factor, functional)
+    return functional
 
 
 @kernel
 def scale_of(eq, r, code):
-    """Return the scale of an event function of unit r, inf without one of its own."""
+    """Return the scale of an event function of unit r, inf without."""
     if eq.scaled[code, 0] < 0:
         return math.inf
-    found = 1.0
-    for place in range(eq.scaled.shape[1]):
-        by = eq.scaled[code, place]
+    scale = 1.0
+    for term in range(eq.scaled.shape[1]):
+        by = eq.scaled[code, term]
         if by >= 0:
-            found *= eq.play[r] if by == 0 else eq.spring[r] if by == 1 else eq.limit[r]
-    return found if found != 0.0 else math.inf
+            scale *= eq.play[r] if by == 0 else eq.spring[r] if by == 1 else eq.limit[r]
+    return scale if scale != 0.0 else math.inf
 
 
 @counting
 def turn_of_function(room, eq, turns, flows, f, r, code, p, z):
-    """Return what number p changes in an event function at z, but for what it changes in z."""
-    found, signal = 0.0, vector(room, len(eq.typical))
-    for place in range(eq.terms.shape[1]):
-        kind, by = eq.terms[code, place, 0], eq.terms[code, place, 1]
+    """Return the explicit derivative of an event function at z by number p."""
+    change, signal = 0.0, vector(room, len(eq.typical))
+    for term in range(eq.terms.shape[1]):
+        kind, by = eq.terms[code, term, 0], eq.terms[code, term, 1]
         if kind < 0:
             continue
-        found += factor_of(eq, r, flows.way[f, r], code, place) * _turn_of_signal(turns, flows, f, p, r, kind, z)
+        change += factor_of(eq, r, flows.way[f, r], code, term) * _turn_of_signal(turns, flows, f, p, r, kind, z)
         turned = _turn_of_factor(turns, p, r, by)
         if turned != 0.0:
             for i in range(len(signal)):
                 signal[i] = 0.0
             _add_signal(eq, flows, f, r, kind, turned, signal)
-            found += dot(signal, z)
-    return found
+            change += dot(signal, z)
+    return change
 
 
 @inlined
 def harmonic_turns(eq, turns, p, h, time):
-    """Return what number p changes in cosine and sine of harmonic h in z at a time since the passage's start, s."""
+    """Return derivatives by number p of cosine and sine of harmonic h in z at a time since the passage's start, s."""
     angle, moved = eq.frequency[h] * time, eq.size * time * turns.frequency[p, h]
     return -math.sin(angle) * moved, math.cos(angle) * moved
 
@@ -170,16 +170,16 @@ def harmonic_turns(eq, turns, p, h, time):
 @counting
 def new_guards(room, eq, turns, count):
     """Return room for the event functions of an event."""
-    part = vector(room, count)
+    parts = vector(room, count)
     return Guards(
         matrix(room, count, len(eq.unit)), matrix(room, count, turns.numbers), vector(room, count), vector(room, count),
-        vector(room, count), part, vector(room, count),
+        vector(room, count), parts, vector(room, count),
     )  # fmt: skip
 
 
 @counting
 def set_guard(room, eq, turns, flows, f, z, moving, bending, guards, g, r, code, met, fastest, time, flight):
-    """Set event function g: of unit r in flow f at z (K,), whose first and second derivatives in time are known.
+    """Set event function g: of unit r in flow f at z (K,), with known first and second time derivatives.
 
     met: its rate as the engine has it, or nan; fastest: speed of the scene, m/s; time: since the passage's start, s.
     """
@@ -194,24 +194,24 @@ def set_guard(room, eq, turns, flows, f, z, moving, bending, guards, g, r, code,
         if functional[i] != 0.0 and guards.part[g] == eq.parts:
             guards.part[g] = eq.part[i % len(eq.root)]
     for p in range(turns.numbers):
-        own = turn_of_function(room, eq, turns, flows, f, r, code, p, z)
+        change = turn_of_function(room, eq, turns, flows, f, r, code, p, z)
         for h in range(len(eq.frequency)):
             cosine, sine = harmonic_turns(eq, turns, p, h, time)
-            own += functional[one + 1 + h] * cosine + functional[one + 1 + len(eq.frequency) + h] * sine
-        guards.own[g, p] = own
+            change += functional[one + 1 + h] * cosine + functional[one + 1 + len(eq.frequency) + h] * sine
+        guards.explicit[g, p] = change
 
 
 @counting
 def along(room, guards, g, M):
-    """Return the derivative (k + P,) of event function g along with that of the motion, M (2N, k + P)."""
-    found, first = vector(room, M.shape[1]), M.shape[1] - guards.own.shape[1]
+    """Return the derivative (k + P,) of event function g along the motion, M (2N, k + P)."""
+    derivative, first = vector(room, M.shape[1]), M.shape[1] - guards.explicit.shape[1]
     for i in range(M.shape[0]):
         if guards.gradient[g, i] != 0.0:
             for c in range(M.shape[1]):
-                found[c] += guards.gradient[g, i] * M[i, c]
-    for p in range(guards.own.shape[1]):
-        found[first + p] += guards.own[g, p]
-    return found
+                derivative[c] += guards.gradient[g, i] * M[i, c]
+    for p in range(guards.explicit.shape[1]):
+        derivative[first + p] += guards.explicit[g, p]
+    return derivative
 
 
 @kernel

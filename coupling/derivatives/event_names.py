@@ -16,7 +16,7 @@ _WAYS = {int(codes.SLIP_LEFT): " left", int(codes.SLIP_RIGHT): " right"}
 
 
 class EventNames:
-    """Names of the units of a scene, and of what happens at them."""
+    """Names of the units of a scene, and of their events."""
 
     def __init__(self, scene: Scene, system: System) -> None:
         self._contact, self._rubs = contacts_of(system), rubs(system)
@@ -34,15 +34,15 @@ class EventNames:
             elif surface == FLOOR and not self._contact[r]:
                 self.names.append(str(body))
             else:
-                place = f"{scene.damper[body].cavity}.{SURFACES[surface]}.{body}"
-                self.names.append(place if corner < 0 else f"{place}.{corner}")
+                wall = f"{scene.damper[body].cavity}.{SURFACES[surface]}.{body}"
+                self.names.append(wall if corner < 0 else f"{wall}.{corner}")
         for name in {name for name in self.names if self.names.count(name) > 1}:  # two points of faces that meet
             for height, r in enumerate(np.flatnonzero(np.array(self.names) == name)):
                 self.names[r] = f"{name}.{height}"
 
-    def possible(self, r: int, what: int) -> str:
+    def possible(self, r: int, code: int) -> str:
         """Return the name of an event that did not happen at unit r, by the meaning of its function."""
-        event = EVENTS[what]
+        event = EVENTS[code]
         turns = event.order == codes.VELOCITY and not self._contact[r]
         return f"{'turns' if turns else event.name} {self.names[r]}"
 

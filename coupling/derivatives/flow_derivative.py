@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from vanedamp.coupling.derivatives.dynamics import Flow
-from vanedamp.coupling.derivatives.numbers import Numbers
+from vanedamp.coupling.derivatives.numbers import Parameters
 from vanedamp.coupling.derivatives.series import Series
 from vanedamp.coupling.numerics import codes
 from vanedamp.coupling.system.unit_laws import wrenches
@@ -19,7 +19,7 @@ _KEPT = 1000
 class FlowDerivative:
     """Derivatives of a flow by P numbers: X (P, K, K), and forces (P, 2u, K) of the units."""
 
-    def __init__(self, flow: Flow, numbers: Numbers) -> None:
+    def __init__(self, flow: Flow, numbers: Parameters) -> None:
         self.flow, self.numbers = flow, numbers
         dynamics, s, of = flow.dynamics, flow.solved, numbers.parts
         system, rates, one = dynamics.system, dynamics.rates, dynamics.one
@@ -37,14 +37,14 @@ class FlowDerivative:
         turns = pull.transpose(0, 2, 1) @ (spring * stretch)
         turns = turns + turns.transpose(0, 2, 1) + stretch.T @ (of.tangential[:, s.holds, None] * stretch)
         free[:, :, dynamics.places] -= turns / dynamics.rate
-        # the projector P = 1 + W C along wrenches W onto the rows R's null space, C: what they carry of loads
+        # the projector P = 1 + W C along wrenches W onto the rows R's null space, C: their part of loads
         of_rows, held = of.rows[:, s.kept], np.eye(len(s.root)) - s.oblique
         of_wrench = wrenches(of.rows, m, drag[m, 0], s.stick)
         of_wrench[..., : len(m)] -= (turned[:, m] * dynamics.rows[u + m]).swapaxes(1, 2)
         oblique = s.oblique @ of_wrench @ s.carried - held @ s.inverse @ of_rows @ s.oblique
         moved = oblique @ flow.free + s.oblique @ free
         carried = s.carried @ (free + of_wrench @ flow.carried - moved)
-        if s.undetermined.size:  # they may move what the rows leave free
+        if s.undetermined.size:  # they may move free directions
             more = self._least(carried, of_rows, of_rows @ s.wrench + s.rows[s.kept] @ of_wrench)
             carried, moved = carried + more, moved + s.wrench @ more
         self.forces[:, s.kept] += carried
@@ -59,7 +59,7 @@ class FlowDerivative:
         """Return what derivatives of the kept rows' forces (P, k, K) lack for these to stay the least.
 
         The least are normal to those that are open, in units of the rows' lengths, and numbers turn both.
-        of_rows (P, k, N), mobility (P, k, k): derivatives of the rows, and of what forces do to them.
+        of_rows (P, k, N), mobility (P, k, k): derivatives of the rows, and of their response to forces.
         """
         s, forces = self.flow.solved, self.flow.carried
         rows, free = s.rows[s.kept], s.undetermined
@@ -81,7 +81,7 @@ class FlowDerivative:
         return self.flow.series.by(self.X)
 
 
-def derivative_of(flow: Flow, numbers: Numbers) -> FlowDerivative:
+def derivative_of(flow: Flow, numbers: Parameters) -> FlowDerivative:
     """Return the derivatives of a flow, which are found once."""
     if flow not in numbers.flows:
         if len(numbers.flows) > _KEPT:

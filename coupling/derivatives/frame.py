@@ -60,13 +60,13 @@ class Frame:
             unit[x + 1] - system.rise[more], unit[x + 2] - system.turn[more],
         )  # fmt: skip
         size, first = len(unit), 0
-        found = zeros((2 * size - len(system.elongation), 2 * size))
-        for part in parts:
-            middle, last = first + len(part), first + 2 * len(part)
-            found[first:middle, :size], found[middle:last, size:] = part, part
+        matrix = zeros((2 * size - len(system.elongation), 2 * size))
+        for rows in parts:
+            middle, last = first + len(rows), first + 2 * len(rows)
+            matrix[first:middle, :size], matrix[middle:last, size:] = rows, rows
             first = last
-        found[first:, :size] = system.elongation
-        return found
+        matrix[first:, :size] = system.elongation
+        return matrix
 
     @property
     def names(self) -> tuple[str, ...]:

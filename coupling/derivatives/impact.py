@@ -1,7 +1,7 @@
 """Jumps of the speeds in impacts, and their derivatives.
 
 Which contacts push, stick and slip is known from the engine's impulses; for these the complementarity problem of an
-impact is a set of linear equations: the jump is a linear map as long as they stay the same. Speeds of approach are the
+impact is a set of linear equations: the jump is a linear map while they stay the same. Speeds of approach are the
 engine's: as differences of the coordinates' rates they would lose their digits. Derivatives are by the N speeds before,
 and behind these by the P numbers of the scene, if there are any.
 """
@@ -73,15 +73,15 @@ class _Approach(NamedTuple):
 @inlined
 def fastest_of(trace, e):
     """Return the fastest speed of the contacts struck in event e, before or after."""
-    found = 0.0
+    fastest = 0.0
     for h in range(trace.first[e], trace.first[e + 1]):
-        found = max(found, max(abs(trace.before[h]), abs(trace.after[h])))
-    return found
+        fastest = max(fastest, max(abs(trace.before[h]), abs(trace.after[h])))
+    return fastest
 
 
 @counting
 def impact(room, eq, turns, trace, e, law, v, speed):
-    """Return the jump of speeds v (N,) by event e, in which contacts take part as the impulses of the engine say.
+    """Return the jump of speeds v (N,) by event e, of contacts with the engine's impulses.
 
     law: (3, u) restitutions, and their derivatives by speed and by coefficient, where they depend on speeds; speed: the
     fastest of the scene, m/s.
@@ -114,30 +114,30 @@ def impact(room, eq, turns, trace, e, law, v, speed):
 def _approach(room, eq, turns, trace, e, law, begun):
     """Return how the contacts meet."""
     units, size, columns = len(eq.rest), len(begun.v), begun.derivative.shape[1]
-    found = _Approach(
+    approach = _Approach(
         vector(room, units), matrix(room, units, columns), vector(room, units), matrix(room, units, columns)
     )
     for r in range(units):
-        found.speed[r] = -dot(eq.J[r], begun.v)
+        approach.speed[r] = -dot(eq.J[r], begun.v)
         for i in range(size):
-            found.slope[r, i] = -eq.J[r, i]
+            approach.slope[r, i] = -eq.J[r, i]
         for p in range(turns.numbers):
-            found.slope[r, size + p] = -dot(turns.J[p, r], begun.v)
+            approach.slope[r, size + p] = -dot(turns.J[p, r], begun.v)
     for h in range(trace.first[e], trace.first[e + 1]):
-        found.speed[trace.struck[h]] = -trace.before[h]
+        approach.speed[trace.struck[h]] = -trace.before[h]
     fastest = fastest_of(trace, e)
     for h in range(trace.first[e], trace.first[e + 1]):
         r = trace.struck[h]
         if not abs(trace.after[h]) > PLASTIC * fastest:
             continue
-        found.restitution[r], by_speed, by_coefficient = eq.restitution[r], 0.0, 1.0
+        approach.restitution[r], by_speed, by_coefficient = eq.restitution[r], 0.0, 1.0
         if eq.law:
-            found.restitution[r], by_speed, by_coefficient = law[0, r], law[1, r], law[2, r]
+            approach.restitution[r], by_speed, by_coefficient = law[0, r], law[1, r], law[2, r]
         for c in range(columns):
-            found.steep[r, c] = by_speed * found.slope[r, c]
+            approach.steep[r, c] = by_speed * approach.slope[r, c]
         for p in range(turns.numbers):
-            found.steep[r, size + p] += by_coefficient * turns.restitution[p, r]
-    return found
+            approach.steep[r, size + p] += by_coefficient * turns.restitution[p, r]
+    return approach
 
 
 @counting
@@ -161,47 +161,47 @@ def _roles(room, eq, v, impulse, speed):
             kind[r] = 2 if eq.friction[r] > 0.0 and not slides else 1
             hits += 1
             sticks += kind[r] == 2
-    found = _Roles(integers(room, hits), integers(room, sticks), drag)
+    roles = _Roles(integers(room, hits), integers(room, sticks), drag)
     a, s = 0, 0
     for r in range(units):
         if kind[r] > 0:
-            found.hit[a] = r
+            roles.hit[a] = r
             a += 1
         if kind[r] == 2:
-            found.sticks[s] = r
+            roles.sticks[s] = r
             s += 1
-    return found
+    return roles
 
 
 @counting
 def _levers(room, eq, hit, drag, sticks):
-    """Return what impulses do to speeds: on contacts that push (m,), with friction (u,), on slips that stick (n,)."""
+    """Return speeds by unit impulses: on contacts that push (m,), with friction (u,), on slips that stick (n,)."""
     units, size = len(eq.rest), len(eq.mass)
-    found = matrix(room, size, len(hit) + len(sticks))
+    levers = matrix(room, size, len(hit) + len(sticks))
     for i in range(size):
         for a in range(len(hit)):
             r = hit[a]
-            found[i, a] = (eq.J[r, i] - drag[r] * eq.J[units + r, i]) / eq.mass[i]
+            levers[i, a] = (eq.J[r, i] - drag[r] * eq.J[units + r, i]) / eq.mass[i]
         for s in range(len(sticks)):
-            found[i, len(hit) + s] = eq.J[units + sticks[s], i] / eq.mass[i]
-    return found
+            levers[i, len(hit) + s] = eq.J[units + sticks[s], i] / eq.mass[i]
+    return levers
 
 
 @kernel
-def _turn_of_levers(eq, turns, p, hit, drag, sticks, lever, impulse, found):
-    """Set found (N,) to what number p changes in levers (N, m + n) times impulses (m + n,)."""
+def _turn_of_levers(eq, turns, p, hit, drag, sticks, lever, impulse, change):
+    """Set change (N,): derivative by number p of levers (N, m + n) times impulses (m + n,)."""
     units = len(eq.rest)
-    for i in range(len(found)):
-        found[i] = 0.0
+    for i in range(len(change)):
+        change[i] = 0.0
         for a in range(len(hit)):
             r = hit[a]
             moved = turns.J[p, r, i] - drag[r] * turns.J[p, units + r, i]
             if eq.friction[r] > 0.0:
                 moved -= drag[r] / eq.friction[r] * turns.friction[p, r] * eq.J[units + r, i]
-            found[i] += moved / eq.mass[i] * impulse[a]
+            change[i] += moved / eq.mass[i] * impulse[a]
         for s in range(len(sticks)):
-            found[i] += turns.J[p, units + sticks[s], i] / eq.mass[i] * impulse[len(hit) + s]
-        found[i] -= dot(lever[i], impulse) * turns.mass[p, i] / eq.mass[i]
+            change[i] += turns.J[p, units + sticks[s], i] / eq.mass[i] * impulse[len(hit) + s]
+        change[i] -= dot(lever[i], impulse) * turns.mass[p, i] / eq.mass[i]
 
 
 @counting
@@ -213,11 +213,11 @@ def _blow(room, eq, turns, v, derivative, roles, target, steep):
     units, size, hit = len(eq.rest), len(v), len(roles.hit)
     count, columns = hit + len(roles.sticks), derivative.shape[1]
     lever = _levers(room, eq, roles.hit, roles.drag, roles.sticks)
-    rows, kept, scale = matrix(room, count, size), integers(room, count), vector(room, count)
+    rows, acting, scale = matrix(room, count, size), integers(room, count), vector(room, count)
     for a in range(count):
-        kept[a] = roles.hit[a] if a < hit else units + roles.sticks[a - hit]
-        copy(rows[a], eq.J[kept[a]])
-        mobility = eq.mobility[kept[a]]
+        acting[a] = roles.hit[a] if a < hit else units + roles.sticks[a - hit]
+        copy(rows[a], eq.J[acting[a]])
+        mobility = eq.mobility[acting[a]]
         scale[a] = 1.0 / math.sqrt(mobility) if mobility > 0.0 else 1.0
     moved = product(room, rows, lever)
     for a in range(count):
@@ -241,13 +241,13 @@ def _blow(room, eq, turns, v, derivative, roles, target, steep):
     for p in range(turns.numbers):
         _turn_of_levers(eq, turns, p, roles.hit, roles.drag, roles.sticks, lever, impulse, of_lever[p])
         for a in range(count):
-            slope[a, size + p] -= dot(turns.J[p, kept[a]], after) + dot(rows[a], of_lever[p])
-    of_impulse, found = product(room, solve, slope), copied(room, derivative)
-    add_product(found, lever, of_impulse)
+            slope[a, size + p] -= dot(turns.J[p, acting[a]], after) + dot(rows[a], of_lever[p])
+    of_impulse, of_after = product(room, solve, slope), copied(room, derivative)
+    add_product(of_after, lever, of_impulse)
     for p in range(turns.numbers):
         for i in range(size):
-            found[i, size + p] += of_lever[p, i]
-    return _Blow(after, found, impulse[:hit], of_impulse[:hit])
+            of_after[i, size + p] += of_lever[p, i]
+    return _Blow(after, of_after, impulse[:hit], of_impulse[:hit])
 
 
 @counting
@@ -274,8 +274,8 @@ def _expand(room, eq, turns, pressed, roles, given, steep, impulse, speed):
     chosen = integers(room, len(roles.hit))
     for a in range(len(roles.hit)):
         r = roles.hit[a]
-        found, asked = impulse[r] * eq.mobility[r], given[r] * eq.mobility[r]
-        if found - asked > _EDGE * found + _ROUND_OFF * speed:
+        actual, asked = impulse[r] * eq.mobility[r], given[r] * eq.mobility[r]
+        if actual - asked > _EDGE * actual + _ROUND_OFF * speed:
             chosen[more] = r
             more += 1
     pushing = _Roles(chosen[:more], roles.sticks, roles.drag)
@@ -289,7 +289,7 @@ def _expand(room, eq, turns, pressed, roles, given, steep, impulse, speed):
 def _newton(room, eq, turns, trace, e, begun, met, speed):
     """Return the jump by Newton's law.
 
-    Where restitutions would bring energy, with the fraction of all of them that brings none: it depends on the speeds.
+    Where restitutions would bring energy, with the fraction of all that brings none: it depends on the speeds.
     """
     size, columns = len(begun.v), begun.derivative.shape[1]
     roles = _roles(room, eq, begun.v, trace.impulse[e], speed)
@@ -318,36 +318,36 @@ def _newton(room, eq, turns, trace, e, begun, met, speed):
         target[a] *= share
         for c in range(columns):
             moved[a, c] *= share
-    part = _blow(room, eq, turns, begun.v, begun.derivative, roles, target, moved)
+    reduced = _blow(room, eq, turns, begun.v, begun.derivative, roles, target, moved)
     still = matrix(room, hit, columns)
     none = _blow(room, eq, turns, begun.v, begun.derivative, roles, vector(room, hit), still)
     # the impulses add the allowed energy, m (v+^2 - v^2) = GAIN m v^2:  m v+ dv+ = (1 + GAIN) m v dv
     by_share, along, gain = vector(room, n), vector(room, columns), 0.0
     for i in range(n):
-        by_share[i] = (part.v[i] - none.v[i]) / share
-        gain += eq.mass[i] * part.v[i] * by_share[i]
+        by_share[i] = (reduced.v[i] - none.v[i]) / share
+        gain += eq.mass[i] * reduced.v[i] * by_share[i]
         for c in range(columns):
             along[c] += (1.0 + _GAIN) * eq.mass[i] * begun.v[i] * begun.derivative[i, c]
-            along[c] -= eq.mass[i] * part.v[i] * part.derivative[i, c]
+            along[c] -= eq.mass[i] * reduced.v[i] * reduced.derivative[i, c]
         for p in range(P):
-            along[n + p] += 0.5 * turns.mass[p, i] * ((1.0 + _GAIN) * begun.v[i] ** 2 - part.v[i] ** 2)
+            along[n + p] += 0.5 * turns.mass[p, i] * ((1.0 + _GAIN) * begun.v[i] ** 2 - reduced.v[i] ** 2)
     for i in range(n):
         for c in range(columns):
-            part.derivative[i, c] += by_share[i] * along[c] / gain
-    return Jump(part.v, part.derivative)
+            reduced.derivative[i, c] += by_share[i] * along[c] / gain
+    return Jump(reduced.v, reduced.derivative)
 
 
 @counting
 def scaled(room, eq, turns, jump, w):
     """Return the derivatives of w (N,) after a jump of speeds by w before (N, N), and by numbers (N, P): w = root v."""
     n = len(w)
-    after, own = matrix(room, n, n), matrix(room, n, turns.numbers)
+    after, offset = matrix(room, n, n), matrix(room, n, turns.numbers)
     for i in range(n):
         for k in range(n):
             after[i, k] = eq.root[i] * jump.derivative[i, k] / eq.root[k]
     for p in range(turns.numbers):
         for i in range(n):
-            own[i, p] = eq.root[i] * jump.derivative[i, n + p] + turns.root[p, i] * jump.v[i]
+            offset[i, p] = eq.root[i] * jump.derivative[i, n + p] + turns.root[p, i] * jump.v[i]
             for k in range(n):
-                own[i, p] -= after[i, k] * turns.root[p, k] * w[k] / eq.root[k]
-    return after, own
+                offset[i, p] -= after[i, k] * turns.root[p, k] * w[k] / eq.root[k]
+    return after, offset

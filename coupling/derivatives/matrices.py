@@ -48,10 +48,10 @@ def vector(room, size):
         first, room.used[2] = 0, 1
         size = min(size, len(room.numbers))
     room.used[0] = first + size
-    found = room.numbers[first : first + size]
+    entries = room.numbers[first : first + size]
     for i in range(size):
-        found[i] = 0.0
-    return found
+        entries[i] = 0.0
+    return entries
 
 
 @kernel
@@ -61,10 +61,10 @@ def integers(room, size):
     if first + size > len(room.integers):
         first, room.used[2] = 0, 1
     room.used[1] = first + size
-    found = room.integers[first : first + size]
+    entries = room.integers[first : first + size]
     for i in range(size):
-        found[i] = 0
-    return found
+        entries[i] = 0
+    return entries
 
 
 @inlined
@@ -76,55 +76,55 @@ def empty(room):
 @kernel
 def unit(room, size):
     """Return the unit matrix (size, size)."""
-    found = matrix(room, size, size)
+    identity = matrix(room, size, size)
     for i in range(size):
-        found[i, i] = 1.0
-    return found
+        identity[i, i] = 1.0
+    return identity
 
 
 @kernel
 def copied(room, a):
     """Return a copy of a matrix."""
-    found = matrix(room, a.shape[0], a.shape[1])
+    b = matrix(room, a.shape[0], a.shape[1])
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
-            found[i, j] = a[i, j]
-    return found
+            b[i, j] = a[i, j]
+    return b
 
 
 @kernel
 def product(room, a, b):
     """Return a b of matrices."""
-    found = matrix(room, a.shape[0], b.shape[1])
-    add_product(found, a, b)
-    return found
+    c = matrix(room, a.shape[0], b.shape[1])
+    add_product(c, a, b)
+    return c
 
 
 @kernel
-def add_product(found, a, b):
+def add_product(c, a, b):
     """Add a b to a matrix."""
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
             factor = a[i, k]
             if factor != 0.0:
                 for j in range(b.shape[1]):
-                    found[i, j] += factor * b[k, j]
+                    c[i, j] += factor * b[k, j]
 
 
 @kernel
-def copy(found, a):
+def copy(to, a):
     """Set numbers to others: an assignment by numba brings its message on shapes, half a second to compile."""
-    for i in range(len(found)):
-        found[i] = a[i]
+    for i in range(len(to)):
+        to[i] = a[i]
 
 
 @kernel
 def times(room, a, x):
-    """Return a x of a matrix and a vector of its columns; those of a longer vector count as far as there are any."""
-    found = vector(room, a.shape[0])
+    """Return a x of a matrix and a vector of its columns, which may be longer."""
+    y = vector(room, a.shape[0])
     for i in range(a.shape[0]):
-        found[i] = dot(a[i], x)
-    return found
+        y[i] = dot(a[i], x)
+    return y
 
 
 @inlined
@@ -152,7 +152,7 @@ def pseudo_inverse(room, a):
     By orthogonal turns of its rows among each other (Hestenes 1958; Golub and Van Loan, Matrix Computations, 8.6.3).
     """
     m, n = a.shape
-    found, turned, turns = matrix(room, n, m), copied(room, a), unit(room, m)
+    inverse, turned, turns = matrix(room, n, m), copied(room, a), unit(room, m)
     for _ in range(_SWEEPS):
         largest = 0.0
         for i in range(m):
@@ -167,10 +167,10 @@ def pseudo_inverse(room, a):
     for i in range(m):  # of a = turns^T turned, the rows of turned orthogonal
         if sizes[i] > SINGULAR * most:
             for k in range(n):
-                part = turned[i, k] / sizes[i] / sizes[i]
+                weight = turned[i, k] / sizes[i] / sizes[i]
                 for j in range(m):
-                    found[k, j] += part * turns[i, j]
-    return found
+                    inverse[k, j] += weight * turns[i, j]
+    return inverse
 
 
 @kernel
@@ -184,10 +184,10 @@ def _turn(turned, turns, i, j):
     slope = 0.5 * (other - one) / both
     t = (1.0 if slope >= 0.0 else -1.0) / (abs(slope) + math.sqrt(1.0 + slope * slope))
     c = 1.0 / math.sqrt(1.0 + t * t)
-    for part in (turned, turns):
-        for k in range(part.shape[1]):
-            x, y = part[i, k], part[j, k]
-            part[i, k], part[j, k] = c * (x - t * y), c * (y + t * x)
+    for rows in (turned, turns):
+        for k in range(rows.shape[1]):
+            x, y = rows[i, k], rows[j, k]
+            rows[i, k], rows[j, k] = c * (x - t * y), c * (y + t * x)
     return abs(both) / size
 
 
@@ -200,8 +200,8 @@ def inverse_of_rows(room, rows):
         lengths[i] = length if length > 0.0 else 1.0
         for j in range(rows.shape[1]):
             scaled[i, j] /= lengths[i]
-    found = pseudo_inverse(room, scaled)
-    for j in range(found.shape[0]):
-        for i in range(found.shape[1]):
-            found[j, i] /= lengths[i]
-    return found
+    inverse = pseudo_inverse(room, scaled)
+    for j in range(inverse.shape[0]):
+        for i in range(inverse.shape[1]):
+            inverse[j, i] /= lengths[i]
+    return inverse

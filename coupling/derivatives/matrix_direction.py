@@ -16,7 +16,7 @@ from vanedamp.rom.reduced import ReducedModel
 class MatrixDirection:
     """Changes (n, n) of the matrices of a scene's reduced model per unit of a number that is zero in the scene.
 
-    name: of the number, in place of a path; mass (kg), damping (N s/m), stiffness (N/m): symmetric; None: no change.
+    name: of the number, instead of a path; mass (kg), damping (N s/m), stiffness (N/m): symmetric; None: no change.
     """
 
     name: str
@@ -34,11 +34,11 @@ class MatrixDirection:
         """Return the amount that changes a matrix by as much as there is. Raises InputError for shapes that differ."""
         model, sizes = self._model(scene), []
         for name, change in self._changes.items():
-            own = getattr(model, name)
-            if np.shape(change) != own.shape:
-                raise InputError(f"{self.name}.{name}: expected the shape {own.shape}, not {np.shape(change)}")
+            matrix = getattr(model, name)
+            if np.shape(change) != matrix.shape:
+                raise InputError(f"{self.name}.{name}: expected the shape {matrix.shape}, not {np.shape(change)}")
             if np.any(change):
-                sizes.append(float(np.linalg.norm(own) / np.linalg.norm(change)) or 1.0)
+                sizes.append(float(np.linalg.norm(matrix) / np.linalg.norm(change)) or 1.0)
         if not sizes:
             raise InputError(f"{self.name}: changes nothing; give mass, damping or stiffness")
         return min(sizes)

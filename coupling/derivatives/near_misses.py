@@ -10,15 +10,15 @@ from vanedamp.coupling.numerics.compiler.jit import ZERO, counting
 
 #: points of a period, and of one turn of the fastest motion, between which least margins are sought
 _LOOKS, _TURN = 32, 12
-#: most points at which it is sought; relative round-off of a slope; steps of Newton's method, and their last size
+#: most points where it is sought; relative round-off of a slope; steps of Newton's method, and their last size
 _POINTS, _ROUND_OFF, _STEPS, _SMALL = 240, 1e-9, 8, 1e-12
 
 
 @counting
-def least_margin(room, eq, flows, walk, f, z, duration, who, what):
+def least_margin(room, eq, flows, walk, f, z, duration, who, code):
     """Return the least margin in a motion from z (K,) over a duration, s, of the events possible in flow f but one.
 
-    That is event `what` of unit `who`. Beside it which it is, -1: none. Relative to its scale, where the margin turns
+    That is event `code` of unit `who`. Beside it which it is, -1: none. Relative to its scale, where the margin turns
     inside the segment by more than round-off: minima between points are found by their slopes.
     """
     count, size = flows.counts[f, 2], len(z)
@@ -33,7 +33,7 @@ def least_margin(room, eq, flows, walk, f, z, duration, who, what):
         for i in range(size):
             largest[i] = max(largest[i], abs(motion[p, i]))
     for m in range(count):
-        if flows.possible[f, m, 0] == who and flows.possible[f, m, 1] == what:
+        if flows.possible[f, m, 0] == who and flows.possible[f, m, 1] == code:
             continue
         functional, slopes, noise = flows.margin[f, m], flows.slope[f, m], 0.0
         for i in range(size):
@@ -60,19 +60,19 @@ def least_margin(room, eq, flows, walk, f, z, duration, who, what):
 def _motion(room, flows, walk, f, z, step, steps):
     """Return the motion (n + 1, K) from z at points a step apart."""
     size = len(z)
-    power, found, start = unit(room, size), matrix(room, steps + 1, size), vector(room, size)
+    power, states, start = unit(room, size), matrix(room, steps + 1, size), vector(room, size)
     follow(room, flows, f, size, start, power, step, walk.terms, walk.of_terms)
     for i in range(size):
-        found[0, i] = z[i]
+        states[0, i] = z[i]
     for p in range(1, steps + 1):
         for i in range(size):
-            found[p, i] = dot(power[i], found[p - 1])
-    return found
+            states[p, i] = dot(power[i], states[p - 1])
+    return states
 
 
 @counting
 def _minimum(room, flows, walk, f, row, z, share, step):
-    """Return the minimum of margin `row` about a share of a step after z, by Newton's method."""
+    """Return the minimum of margin `row` about a fraction of a step after z, by Newton's method."""
     at, low, high, now, bends = share * step, 0.0, step, vector(room, len(z)), vector(room, len(z))
     slopes, nothing = flows.slope[f, row], matrix(room, len(z), ZERO)
     for n in range(flows.counts[f, 0]):

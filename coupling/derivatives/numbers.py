@@ -1,7 +1,7 @@
-"""What the numbers of a scene do to its equations: derivatives of all that flows, events and impacts are made of.
+"""Derivatives by the numbers of a scene of all that flows, events and impacts are made of.
 
 They are exact: the scene is assembled once with numbers that have derivatives (tangents.dual). Contact laws, shapes and
-reduced models whose modes change have differences of their own (tangents.opaque).
+reduced models with changing modes have their own differences (tangents.opaque).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import Dynamics
+from vanedamp.coupling.derivatives.dynamics import ScaledDynamics
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
 from vanedamp.coupling.scene.paths import with_numbers
@@ -32,11 +32,11 @@ _NO_NUMBERS = ("time", "solver", "continuation", "sweep", "orbit", "ramp", "ring
 StartOf = Callable[[Scene, Frame], np.ndarray]
 
 
-class Parts(NamedTuple):
-    """What the equations are made of, in the scales of Dynamics: N coordinates, u units, j sliders, k states.
+class EquationArrays(NamedTuple):
+    """Arrays of the equations, in the scales of ScaledDynamics: N coordinates, u units, j sliders, k states.
 
     follows, bound: (j, 2N) and (j,), u of a slider that slips is follows u - way bound (places only); others as in
-    System and Dynamics. Of derivatives by P numbers, every array has an axis (P,) before these.
+    System and ScaledDynamics. Of derivatives by P numbers, every array has an axis (P,) before these.
     """
 
     root: np.ndarray  # (N,)
@@ -66,16 +66,16 @@ class Parts(NamedTuple):
     start: np.ndarray  # (k,)
 
     @classmethod
-    def of(cls, dynamics: Dynamics, start: np.ndarray) -> Parts:
+    def of(cls, dynamics: ScaledDynamics, start: np.ndarray) -> EquationArrays:
         """Return the parts of a scene's dynamics."""
         system = dynamics.system
-        own = {"spring": np.where(np.isfinite(system.spring), system.spring, 0.0), "period": system.period}
-        known = system._asdict() | vars(dynamics) | own | {"start": start}
+        arrays = {"spring": np.where(np.isfinite(system.spring), system.spring, 0.0), "period": system.period}
+        known = system._asdict() | vars(dynamics) | arrays | {"start": start}
         return cls(*(known[name] for name in cls._fields))
 
 
 @dataclass(frozen=True, eq=False)
-class Numbers:
+class Parameters:
     """Numbers of a scene, P of them: their derivatives are by `size` (P,) of each.
 
     parts: derivatives of the parts of the equations, times the sizes; paths (P,); frequency: (e,) of the harmonics,
@@ -84,7 +84,7 @@ class Numbers:
 
     paths: tuple[str, ...]
     size: np.ndarray
-    parts: Parts
+    parts: EquationArrays
     frequency: np.ndarray
     scene: Scene
     #: derivatives of the flows that a motion has met (derivatives.flow_derivative)
@@ -96,25 +96,25 @@ class Numbers:
         return len(self.paths)
 
     def of_scene(self, read: Callable[[Scene], np.ndarray], here: np.ndarray) -> np.ndarray:
-        """Return the derivatives (n, P) of what the scene says besides its equations: `here` (n,); nan at kinks."""
+        """Return derivatives (n, P) of other data of the scene: `here` (n,); nan at kinks."""
         with numbers(len(self)):
-            found = opaque(read, self.scene, unknown=True)
-        return found.turns if isinstance(found, Dual) else np.zeros((len(here), len(self)))
+            result = opaque(read, self.scene, unknown=True)
+        return result.turns if isinstance(result, Dual) else np.zeros((len(here), len(self)))
 
-    def harmonics(self, dynamics: Dynamics, time: float) -> np.ndarray:
+    def harmonics(self, dynamics: ScaledDynamics, time: float) -> np.ndarray:
         """Return the derivatives (P, K) of constants and harmonics in z at a time since the passage's start, s."""
         e, one = len(self.frequency), dynamics.one
-        found = np.zeros((len(self), one + 1 + 2 * e))
+        rows = np.zeros((len(self), one + 1 + 2 * e))
         angle = self.frequency * time
-        found[:, one + 1 : one + 1 + e] = -dynamics.size * np.sin(angle) * time * self.parts.frequency
-        found[:, one + 1 + e :] = dynamics.size * np.cos(angle) * time * self.parts.frequency
-        return found
+        rows[:, one + 1 : one + 1 + e] = -dynamics.size * np.sin(angle) * time * self.parts.frequency
+        rows[:, one + 1 + e :] = dynamics.size * np.cos(angle) * time * self.parts.frequency
+        return rows
 
 
 def numbers_of(
-    scene: Scene, paths: Sequence[str | MatrixDirection], dynamics: Dynamics,
+    scene: Scene, paths: Sequence[str | MatrixDirection], dynamics: ScaledDynamics,
     begins: StartOf | None = None, derived: Callable[[Scene], Scene] = lambda scene: scene,
-) -> Numbers:  # fmt: skip
+) -> Parameters:  # fmt: skip
     """Return the derivatives of a scene's equations by the numbers at some paths.
 
     begins: the start of the motion, if numbers change it; derived: the scene that moves, from the one that has the
@@ -130,49 +130,52 @@ def numbers_of(
                 moving = changed(moving, structure=changed(moving.structure, moves=tuple(moves)))
             frame = Frame(moving, dynamics.frame.speed, dynamics.frame.begin)
             start = zeros(len(frame.to_state)) if begins is None else begins(turned, frame)
-            made = Parts.of(Dynamics(frame, dynamics.scale, dynamics), start)
+            made = EquationArrays.of(ScaledDynamics(frame, dynamics.scale, dynamics), start)
         except NotSmooth:
             at = [0.0 if isinstance(path, MatrixDirection) else scene.number(path) for path in paths]
-            told = ", ".join(f"{name} = {value:g}" for name, value in zip(names, at, strict=True))
-            raise NotSmooth(f"{told}: the equations of motion have a kink there") from None
-    parts = Parts(*(_turns(part, len(paths)) for part in made))
-    if not all(np.all(np.isfinite(part)) for part in parts):
+            point = ", ".join(f"{name} = {value:g}" for name, value in zip(names, at, strict=True))
+            raise NotSmooth(f"{point}: the equations of motion have a kink there") from None
+    parts = EquationArrays(*(_turns(array, len(paths)) for array in made))
+    if not all(np.all(np.isfinite(array)) for array in parts):
         raise NotSmooth("the equations of motion have a kink there")
-    return Numbers(names, sizes, parts, dynamics.system.frequency, moving)
+    return Parameters(names, sizes, parts, dynamics.system.frequency, moving)
 
 
-def _turns(part: Any, count: int) -> np.ndarray:
-    """Return the derivatives (P, ...) of a part of the equations."""
-    return np.moveaxis(part.turns, -1, 0) if isinstance(part, Dual) else np.zeros((count, *np.shape(part)))
+def _turns(array: Any, count: int) -> np.ndarray:
+    """Return the derivatives (P, ...) of an array of the equations."""
+    return np.moveaxis(array.turns, -1, 0) if isinstance(array, Dual) else np.zeros((count, *np.shape(array)))
 
 
 def _turned(
-    scene: Scene, paths: Sequence[str | MatrixDirection], dynamics: Dynamics, derived: Callable[[Scene], Scene]
+    scene: Scene, paths: Sequence[str | MatrixDirection], dynamics: ScaledDynamics, derived: Callable[[Scene], Scene]
 ) -> tuple[Scene, list[Any], np.ndarray]:
     """Return a scene whose numbers at some paths turn by their sizes, and these (P,).
 
     Beside it, what moves its reduced model: structures of the scene that moves, and by how much (modal_basis.moved).
     """
     sizes, moves, given, data = np.zeros(len(paths)), list[Any](), dict[str, Dual](), scene.to_dict()
-    for place, path in enumerate(paths):
-        own = np.eye(len(paths))[place]
+    for index, path in enumerate(paths):
+        direction = np.eye(len(paths))[index]
         if isinstance(path, MatrixDirection):
-            sizes[place] = path.size(scene)
+            sizes[index] = path.size(scene)
             moves.append(
-                (lambda amount, path=path: derived(path.at(scene, amount)).structure, Dual(0.0, sizes[place] * own))
+                (
+                    lambda amount, path=path: derived(path.at(scene, amount)).structure,
+                    Dual(0.0, sizes[index] * direction),
+                )
             )
             continue
         value = number_of_motion(scene, path, "numbers", data=data)
-        sizes[place] = abs(value) or _size(path, dynamics)
+        sizes[index] = abs(value) or _size(path, dynamics)
         if path.startswith("structure.") and isinstance(scene.structure, Rom):
             moves.append((
                 lambda amount, path=path, value=value: derived(scene.replace({path: value + amount})).structure,
-                Dual(0.0, sizes[place] * own),
+                Dual(0.0, sizes[index] * direction),
             ))  # fmt: skip
         elif path in given:
-            given[path].turns[:] += sizes[place] * own
+            given[path].turns[:] += sizes[index] * direction
         else:
-            given[path] = Dual(value, sizes[place] * own)
+            given[path] = Dual(value, sizes[index] * direction)
     return with_numbers(scene, data, given), moves, sizes
 
 
@@ -191,7 +194,7 @@ def number_of_motion(
         raise InputError(f"{key}: {str(error).removeprefix('scene: ')}") from None
 
 
-def _size(path: str, dynamics: Dynamics) -> float:
+def _size(path: str, dynamics: ScaledDynamics) -> float:
     """Return over how much a number changes the motion that is zero in the scene."""
     system = dynamics.system
     play = system.play[np.isfinite(system.play) & (system.play > 0.0)]

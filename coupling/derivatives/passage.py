@@ -50,7 +50,7 @@ class Passage(NamedTuple):
     state: (k,) after the periods; derivative: (k, k) of it with respect to the state before, one-sided where the map
     has kinks; crossings: the events in order, of which the names are the sequence that tells branches apart;
     clearance: the smallest distance to an event that did not happen (a gap that nearly closed, a force near its bound),
-    as a fraction of its scale (free travel, bound), and which: (share, name); inf where nothing came near;
+    relative to its scale (free travel, bound), and which: (fraction, name); inf where nothing came near;
     peaks: (periods,) m, largest magnitude of the response's displacement in each period, as in a Response;
     by_number: (k, P) derivative of the state with respect to the numbers of the map, from the same start.
     """
@@ -101,32 +101,32 @@ def forecast(seen: Sequence[tuple[float, Passage]]) -> float | None:
         return None
     (early, one), (late, two) = seen[-2:]
     before, after = _vanishing(one), _vanishing(two)
-    found = [
+    times = [
         late + (late - early) * after[name] / (before[name] - after[name])
         for name in before.keys() & after.keys()
         if 0.0 <= after[name] < before[name]
     ]
-    return min(found, default=None)
+    return min(times, default=None)
 
 
 def _vanishing(passage: Passage) -> dict[str, float]:
     """Return the quantities of a passage that are positive and vanish where its sequence ends, by name."""
     crossings = passage.crossings
-    found = {f"speed {place}": abs(crossing.speed) for place, crossing in enumerate(crossings)}
-    for place, (one, other) in enumerate(itertools.pairwise(crossings)):
-        found[f"order {place}"] = other.time - one.time
+    values = {f"speed {index}": abs(crossing.speed) for index, crossing in enumerate(crossings)}
+    for index, (one, other) in enumerate(itertools.pairwise(crossings)):
+        values[f"order {index}"] = other.time - one.time
     if crossings:
-        found["start"] = crossings[0].time
+        values["start"] = crossings[0].time
     share, name = passage.clearance
     if name:
-        found[f"clearance {name}"] = share
-    return found
+        values[f"clearance {name}"] = share
+    return values
 
 
 def change(before: Passage, after: Passage | None) -> tuple[str, str]:
-    """Return the kind of a special point where the sequence changes, and what happens there.
+    """Return the kind of a special point where the sequence changes, and its description.
 
-    "grazing" where an impact begins or ceases, "sequence" for any other change; after: None if that is not known.
+    "grazing" where an impact begins or ceases, "sequence" for any other change; after: None if unknown.
     """
     if after is None:
         near = before.clearance[1]

@@ -47,7 +47,7 @@ from vanedamp.coupling.numerics.compiler.jit import counting, counting_entry
 
 @counting_entry
 def walk_along(eq, turns, flows, trace, walk, room):
-    """Go on along a course. Returns KNOWN at its present end, or what Python is to find first (saltation)."""
+    """Continue along a course. Returns KNOWN at its present end, or what Python must find first (saltation)."""
     at = walk.at
     while at[NEXT] < trace.at[COUNT]:
         i = at[NEXT]
@@ -144,14 +144,14 @@ def _part(room, eq, turns, flows, walk, trace, i, f, z):
 
 @counting_entry
 def end_walk(eq, turns, flows, trace, walk, room, final, periods):
-    """Compare the end of a passage with the engine's, a state (k,), and note what is there. Returns if they agree."""
+    """Compare the end of a passage with the engine's, a state (k,), and note kinks there. Returns if they agree."""
     empty(room)
     one, i = len(eq.unit), walk.at[NEXT] - 1
-    before, own = times(room, eq.to_state, walk.z[:one]), vector(room, one)
-    found = times(room, eq.from_state, final)
+    before, start = times(room, eq.to_state, walk.z[:one]), vector(room, one)
+    end = times(room, eq.from_state, final)
     for n in range(one):
-        own[n] = dot(eq.from_state[n], before)
-    if not agrees(room, eq, walk, own, found):
+        start[n] = dot(eq.from_state[n], before)
+    if not agrees(room, eq, walk, start, end):
         worsen(walk, UNDETERMINED)
         return False
     if periods * eq.period - walk.last[0] <= SIMULTANEOUS * eq.period:

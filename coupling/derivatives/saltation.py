@@ -1,4 +1,4 @@
-"""What an event does to the derivative of a motion, from the equations of motion.
+"""The derivative of a motion across an event, from the equations of motion.
 
 The derivative of a passage is the product, in the order of time, of the propagators of segments and of the saltation
 matrices of events (Aizerman and Gantmakher 1958; Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth
@@ -12,36 +12,22 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.derivatives.constraints import (
-    Map,
+    AffineMap,
     applied,
     begun,
+    explicit_of,
     followed,
     held,
     largest,
     left,
     left_of,
-    own_of,
     presses,
     pressing,
     then,
 )
-from vanedamp.coupling.derivatives.event_functions import (
-    along,
-    generated,
-    is_tangential,
-    new_guards,
-    set_guard,
-)
+from vanedamp.coupling.derivatives.event_functions import along, generated, is_tangential, new_guards, set_guard
 from vanedamp.coupling.derivatives.impact import fastest_of, impact, scaled
-from vanedamp.coupling.derivatives.matrices import (
-    add_product,
-    dot,
-    integers,
-    matrix,
-    product,
-    unit,
-    vector,
-)
+from vanedamp.coupling.derivatives.matrices import add_product, dot, integers, matrix, product, unit, vector
 from vanedamp.coupling.derivatives.walking import (
     COINCIDENT,
     COMPLETED,
@@ -73,7 +59,7 @@ _CAUGHT = 1e-11
 _LEAST_TURN = 1e-2
 #: largest motion of rows at rest by the derivative, relative to its terms
 _STILL = 1e-6
-#: what reaches its bound without a jump is the same on both sides but for this part of its terms: at forces, others
+#: bounds reached without a jump agree on both sides to this part of their terms: forces, others
 _CONTINUOUS, ROUND_OFF = 1e-9, 1e-12
 #: a derivative that does not matter; a difference by which shifts of events may differ that are one
 _NOTHING, _ONE_INSTANT = 1e-9, 1e-6
@@ -119,33 +105,33 @@ def state_at(room, eq, trace, i):
 @counting
 def closed_at(room, eq, trace, i):
     """Return whether contacts (u,) are closed as segment i begins, with or without force."""
-    found = integers(room, len(eq.rest))
+    closed = integers(room, len(eq.rest))
     for r in range(eq.contacts):
         gap = eq.rest[r] + dot(eq.J[r], trace.q[i])
         # one at rest that parts from now on has been closed until now
         rests = gap <= SHUT * eq.play[r] and abs(dot(eq.J[r], trace.v[i])) <= SLOW * trace.speed[i]
-        found[r] = 1 if trace.state[i, r] != OPEN or rests else 0
-    return found
+        closed[r] = 1 if trace.state[i, r] != OPEN or rests else 0
+    return closed
 
 
 @counting
-def agrees(room, eq, walk, predicted, found):
+def agrees(room, eq, walk, predicted, actual):
     """Return whether two states u (2N,) are one."""
     size, sliders = len(eq.root), len(eq.bound)
-    own, terms = vector(room, len(eq.scale)), vector(room, 2 * size)
-    for s in range(len(own)):
-        own[s] = abs(dot(eq.to_state[s], found))
+    sizes, terms = vector(room, len(eq.scale)), vector(room, 2 * size)
+    for s in range(len(sizes)):
+        sizes[s] = abs(dot(eq.to_state[s], actual))
     for i in range(2 * size):
-        # a body's place is slip plus structure, which may cancel
-        for s in range(len(own)):
-            terms[i] += abs(eq.from_state[i, s]) * own[s]
+        # slip and structure may cancel
+        for s in range(len(sizes)):
+            terms[i] += abs(eq.from_state[i, s]) * sizes[s]
     same = True
     for i in range(size):
         # a coordinate and its rate have one size, since either may pass through zero
         both = max(terms[i], terms[size + i])
         for at in (i, size + i):
             walk.size[at] = max(walk.size[at], both)
-            if not (i >= size - sliders or abs(predicted[at] - found[at]) <= _AGREEMENT * walk.size[at]):
+            if not (i >= size - sliders or abs(predicted[at] - actual[at]) <= _AGREEMENT * walk.size[at]):
                 same = False
     return same
 
@@ -154,7 +140,7 @@ def agrees(room, eq, walk, predicted, found):
 def _guards_of(room, eq, turns, flows, walk, trace, i, z, moving):
     """Return the event functions that vanish at event i, of which the first is its own."""
     units, f = len(eq.rest), walk.at[FLOW]
-    unit_, what, time = trace.unit[i], trace.what[i], start_of(eq, trace, i - 1) + trace.duration[i - 1]
+    unit_, event, time = trace.unit[i], trace.what[i], start_of(eq, trace, i - 1) + trace.duration[i - 1]
     more, count = integers(room, units), 1
     for r in range(units):
         struck = False
@@ -163,19 +149,19 @@ def _guards_of(room, eq, turns, flows, walk, trace, i, z, moving):
         if struck and eq.spring[r] == math.inf and trace.state[i - 1, r] == OPEN and r != unit_:
             more[r] = CLOSES
             count += 1
-    if eq.order[what] == VELOCITY:
+    if eq.order[event] == VELOCITY:
         for r in range(units):
             slides = flows.way[f, r] != 0.0 and not flows.slips_held[f, r] and eq.rubs[r]
             slides = slides and trace.state[i, r] != trace.state[i - 1, r] and r != unit_
             if slides and abs(dot(eq.J[units + r], trace.v[i])) <= ROUND_OFF * trace.speed[i - 1]:
                 count += 1 if more[r] == 0 else 0
-                more[r] = what
+                more[r] = event
     guards, bending = new_guards(room, eq, turns, count), vector(room, len(z))
     generated(flows, f, moving, bending)
     g = 0
-    for place in range(-1, units):
-        r, code = (unit_, what) if place < 0 else (place, more[place])
-        if place >= 0 and code == 0:
+    for k in range(-1, units):
+        r, code = (unit_, event) if k < 0 else (k, more[k])
+        if k >= 0 and code == 0:
             continue
         met = math.nan
         if code == CLOSES:
@@ -197,7 +183,7 @@ def _jump(room, eq, turns, walk, trace, i, before, z):
     before, z: (K,) before and after.
     """
     size, units = len(eq.root), len(eq.rest)
-    found = Map(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.numbers))
+    map_ = AffineMap(unit(room, size), unit(room, size), matrix(room, 2 * size, turns.numbers))
     w, w_new = before[size : 2 * size], z[size : 2 * size]
     kick, hits, struck = vector(room, size), False, vector(room, size)
     for r in range(2 * units):
@@ -218,26 +204,26 @@ def _jump(room, eq, turns, walk, trace, i, before, z):
             if eq.spring[r] < math.inf:
                 continue
             if abs(dot(eq.J[r], jump.v) - trace.after[h]) > bound:
-                return found, kick, False
+                return map_, kick, False
             # after a plastic impact a small restitution adds bounces that end at once, whose sum is nothing to first
             # order; not so where the contact opens
             if eq.restitution[r] == 0.0 and not presses(trace.state[i, r]) and trace.state[i, r] != TOUCHING:
                 for p in range(turns.numbers):
                     if turns.restitution[p, r] != 0.0:
-                        return found, kick, False
-        rates, own = scaled(room, eq, turns, jump, w)
-        found = Map(found.places, rates, found.own)
+                        return map_, kick, False
+        rates, offset = scaled(room, eq, turns, jump, w)
+        map_ = AffineMap(map_.places, rates, map_.offset)
         for k in range(size):
             struck[k] = eq.root[k] * jump.v[k]
             for p in range(turns.numbers):
-                found.own[size + k, p] = own[k, p]
+                map_.offset[size + k, p] = offset[k, p]
     after = vector(room, len(z))
     for k in range(len(z)):
         after[k] = z[k]
     for k in range(size):
         after[k], after[size + k] = before[k], struck[k]
     follow = followed(room, eq, turns, trace.state[i], after)
-    found = _on_rates(room, found, follow)
+    map_ = _on_rates(room, map_, follow)
     known = True
     for h in range(trace.first[i], trace.first[i + 1]):
         for other in range(h + 1, trace.first[i + 1]):
@@ -267,7 +253,7 @@ def _jump(room, eq, turns, walk, trace, i, before, z):
         stop = then(
             room, held(room, eq, turns, still, stuck, z), followed(room, eq, turns, trace.state[i], z)
         )  # fmt: skip
-        found = _on_rates(room, found, stop)
+        map_ = _on_rates(room, map_, stop)
         for k in range(size):
             by_law[k] = before[k]
             by_law[size + k] = dot(stop.rates[k], by_impulse[size:])
@@ -280,24 +266,24 @@ def _jump(room, eq, turns, walk, trace, i, before, z):
     known = known and agrees(room, eq, walk, by_impulse, z)
     for k in range(size - len(eq.bound), size):
         kick[k] = w_new[k] - w[k]
-    return found, kick, known
+    return map_, kick, known
 
 
 @counting
 def _on_rates(room, one, other):
     """Return a map of rates and then that part of another: places stay."""
     size = len(one.places)
-    own = matrix(room, 2 * size, one.own.shape[1])
-    add_product(own[size:], other.rates, one.own[size:])
+    offset = matrix(room, 2 * size, one.offset.shape[1])
+    add_product(offset[size:], other.rates, one.offset[size:])
     for k in range(size, 2 * size):
-        for p in range(own.shape[1]):
-            own[k, p] += other.own[k, p]
-    return Map(one.places, product(room, other.rates, one.rates), own)
+        for p in range(offset.shape[1]):
+            offset[k, p] += other.offset[k, p]
+    return AffineMap(one.places, product(room, other.rates, one.rates), offset)
 
 
 @counting
 def after_event(room, eq, turns, flows, walk, trace, i, f, z):
-    """Return the derivative (2N, C) after event i as the motion goes on from z (K,) in flow f, and what came of it."""
+    """Return the derivative (2N, C) after event i as the motion continues from z (K,) in flow f, and the outcome."""
     before, M, one = walk.z, walk.end[: len(eq.unit)], len(eq.unit)
     for c in range(len(walk.shift)):
         walk.shift[c] = 0.0
@@ -344,18 +330,18 @@ def after_event(room, eq, turns, flows, walk, trace, i, f, z):
 
 @counting
 def _saltation(room, eq, turns, flows, walk, trace, i, f, z, M, moving, jump, jumped, guards):
-    """Return the derivative after an event: jump M, and the effect of the event's shift in time; and what came of it.
+    """Return the derivative after an event: jump M, and the effect of the event's shift in time; and the outcome.
 
-    z: (K,) after; moving: X z before; jumped: (N,) of w. Parts of the system that do not feel each other have their own
+    z: (K,) after; moving: X z before; jumped: (N,) of w. Parts of the system that are not coupled have their own
     events.
     """
     size, one, columns, units = len(eq.root), len(eq.unit), M.shape[1], len(eq.rest)
-    what, count, parts = trace.what[i], len(guards.rate), walk.last_shift.shape[0]
+    event, count, parts = trace.what[i], len(guards.rate), walk.last_shift.shape[0]
     after, kick, hits = vector(room, len(z)), vector(room, one), False
     generated(flows, f, z, after)
     for r in range(2 * units):
         hits = hits or trace.impulse[i, r] != 0.0
-    of_force = eq.order[what] == FORCE
+    of_force = eq.order[event] == FORCE
     round_off = _CONTINUOUS if of_force else ROUND_OFF
     for k in range(one):
         on_rates = k >= size
@@ -376,22 +362,22 @@ def _saltation(room, eq, turns, flows, walk, trace, i, f, z, M, moving, jump, ju
     for g in range(count):
         part = int(guards.part[g])
         if known[part] == 0:
-            known[part], own = 1, along(room, guards, g, M)
+            known[part], derivative = 1, along(room, guards, g, M)
             rate = guards.rate[g] if guards.rate[g] != 0.0 else math.inf
             for c in range(columns):
-                shifts[part, c] = -own[c] / rate
+                shifts[part, c] = -derivative[c] / rate
     for c in range(columns):
         walk.shift[c] = shifts[first, c]
     unmoved = applied(room, jump, M)
     moved, difference = matrix(room, one, columns), matrix(room, one, columns)
     for k in range(one):
-        own = eq.part[k % size]
-        owner = own if known[own] and own != first else first
+        derivative = eq.part[k % size]
+        owner = derivative if known[derivative] and derivative != first else first
         for c in range(columns):
             difference[k, c] = -kick[k] * shifts[owner, c]
             moved[k, c] = unmoved[k, c] + difference[k, c]
     matters = hits or largest(room, eq, difference) > _NOTHING * max(largest(room, eq, M), 1.0)
-    if what == CLOSES and eq.spring[trace.unit[i]] < math.inf:
+    if event == CLOSES and eq.spring[trace.unit[i]] < math.inf:
         begin = 0
         for r in range(units):
             yields = eq.spring[r] < math.inf and presses(trace.state[i, r]) and trace.state[i - 1, r] == OPEN
@@ -412,7 +398,7 @@ def _saltation(room, eq, turns, flows, walk, trace, i, f, z, M, moving, jump, ju
     for h in range(trace.first[i], trace.first[i + 1]):
         stopped = stopped and trace.after[h] == 0.0
         shut = shut and closed[trace.struck[h]]
-    rests = what == CLOSES and count > 1 and (stopped or shut)
+    rests = event == CLOSES and count > 1 and (stopped or shut)
     # sliders come to rest at several contacts in any order, and a chatter ends in any
     free = (rests and eq.in_line) or _last_flights(eq, walk, trace, i, guards)
     any_apart, counts = _apart(room, eq, walk, trace, i, M, guards, shifts, free)
@@ -423,7 +409,7 @@ def _saltation(room, eq, turns, flows, walk, trace, i, f, z, M, moving, jump, ju
     if of_force:
         for r in range(2 * units):
             if trace.open_force[i - 1, r] != 0.0:
-                return M, UNTRUSTED  # of forces that the laws leave open the engine has chosen one
+                return M, UNTRUSTED  # of undetermined forces the engine has chosen one
     walk.last[0] = start_of(eq, trace, i)
     for part in range(parts):
         walk.shifted[part] = known[part]
@@ -449,14 +435,14 @@ def _apart(room, eq, walk, trace, i, M, guards, shifts, free):
     """Return whether another event at the instant of one is apart in neighbouring motions, and in one that counts."""
     some, counts = False, False
     for g in range(len(guards.rate) if not free else 0):
-        part, own = int(guards.part[g]), along(room, guards, g, M)
+        part, derivative = int(guards.part[g]), along(room, guards, g, M)
         again = g == 0 and start_of(eq, trace, i) - walk.last[0] <= _INSTANT * eq.period
         if g == 0 and not (again and walk.shifted[part]):
             continue
         for c in range(M.shape[1]):
             later = guards.rate[g] * (walk.last_shift[part, c] if g == 0 else shifts[part, c])
-            terms = abs(own[c]) + abs(later)
-            if abs(own[c] + later) > max(_ONE_INSTANT * terms, _NOTHING * guards.scale[g]):
+            terms = abs(derivative[c]) + abs(later)
+            if abs(derivative[c] + later) > max(_ONE_INSTANT * terms, _NOTHING * guards.scale[g]):
                 some, counts = True, counts or c >= walk.at[COUNTS]
     return some, counts
 
@@ -466,10 +452,10 @@ def _closings(room, eq, turns, flows, walk, trace, i, M):
     """Return the derivative after contacts that yield have begun at one instant, each by its own gap."""
     units, one, columns, z = len(eq.rest), len(eq.unit), M.shape[1], walk.z
     order, count = integers(room, units), 0
-    for place in range(-1, units):
-        r = trace.unit[i] if place < 0 else place
+    for unit_ in range(-1, units):
+        r = trace.unit[i] if unit_ < 0 else unit_
         closes = trace.state[i - 1, r] == OPEN and presses(trace.state[i, r]) and eq.spring[r] < math.inf
-        if closes and (place < 0 or r != trace.unit[i]):
+        if closes and (unit_ < 0 or r != trace.unit[i]):
             order[count] = r
             count += 1
     ways, rate, later = matrix(room, 2 * one, columns), vector(room, len(z)), vector(room, len(z))
@@ -506,9 +492,9 @@ def _closings(room, eq, turns, flows, walk, trace, i, M):
 
 @kernel
 def find(flows, state, open_force):
-    """Return the place of the flow with units in states (u,), -1 if there is none yet."""
+    """Return the index of the flow with units in states (u,), -1 without."""
     for f in range(len(flows.norm)):
-        same = flows.counts[f, 0] > 0  # of an empty place it is none
+        same = flows.counts[f, 0] > 0  # empty: none
         for r in range(len(state)):
             same = same and flows.state[f, r] == state[r]
         for r in range(len(open_force) if same else 0):
@@ -521,20 +507,20 @@ def find(flows, state, open_force):
 
 
 @kernel
-def set_largest(M, states, found):
-    """Set found (m, 1 + P) to the largest entries of rows of a derivative (m, k + P): by the start, by each number."""
+def set_largest(M, states, most):
+    """Set most (m, 1 + P) to the largest entries of rows of a derivative (m, k + P): by the start, by each number."""
     for i in range(len(M)):
-        found[i, 0] = 0.0
+        most[i, 0] = 0.0
         for c in range(M.shape[1]):
             if c < states:
-                found[i, 0] = max(found[i, 0], abs(M[i, c]))
+                most[i, 0] = max(most[i, 0], abs(M[i, c]))
             else:
-                found[i, 1 + c - states] = abs(M[i, c])
+                most[i, 1 + c - states] = abs(M[i, c])
 
 
 @counting
 def _still(room, eq, turns, flows, walk, trace, i, f, z, M):
-    """Return the derivative without what moves rows at rest, and whether that is no more than round-off.
+    """Return the derivative without motion of rows at rest, and whether that was round-off.
 
     Round-off is relative to the largest derivatives so far: after a chatter has amplified these, it may be as large
     as the derivative is now.
@@ -568,7 +554,7 @@ def _still(room, eq, turns, flows, walk, trace, i, f, z, M):
         for a in range(len(rows)):
             functional = eq.speed[rows[a]] if kind == SPEEDS else eq.gap[rows[a]]
             for c in range(1 + P):
-                terms = abs(own_of(turns, c - 1, rows[a], z, kind)) if c > 0 else 0.0
+                terms = abs(explicit_of(turns, c - 1, rows[a], z, kind)) if c > 0 else 0.0
                 of_now = terms
                 for j in range(one):
                     terms += abs(functional[j]) * walk.reach[j, c]

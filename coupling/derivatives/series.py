@@ -25,7 +25,7 @@ _MOST = 200
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomial.legendre.leggauss(12)[1] / 2
 
 
-class Course(NamedTuple):
+class Trajectory(NamedTuple):
     """A motion over a time: n nodes in it with weights (n,) of integrals, s.
 
     time (n,) s; z (n, K), Z (n, K, ...): the motion and its derivatives there; last (K,), end (K, ...): at its end.
@@ -44,7 +44,7 @@ class Series:
 
     def __init__(self, X: np.ndarray) -> None:
         self.X, self.alone = X, self
-        # units of the constants, in which stiff springs have loads far above what they move, are no rates
+        # units of the constants, in which stiff springs have huge loads, are no rates
         balanced = np.abs(matrix_balance(X, permute=False)[0])
         self.norm = float(min(balanced.sum(axis=0).max(), balanced.sum(axis=1).max()))
         rows, columns = np.nonzero(X)
@@ -53,18 +53,18 @@ class Series:
 
     def by(self, D: np.ndarray) -> Series:
         """Return the same series with derivatives D (P, K, K) of the flow."""
-        found = copy(self)
-        found._set_derivatives(D)
-        return found
+        series = copy(self)
+        series._set_derivatives(D)
+        return series
 
     def _set_derivatives(self, D: np.ndarray) -> None:
         number, at, of = np.nonzero(D)
         self._D, self._numbers = (number, at, of, D[number, at, of]), len(D)
 
-    def pieces(self, z: np.ndarray, Z: np.ndarray, duration: float) -> Iterator[tuple[float, float, Course]]:
+    def pieces(self, z: np.ndarray, Z: np.ndarray, duration: float) -> Iterator[tuple[float, float, Trajectory]]:
         """Yield start, end and course, with nodes, of the pieces of a motion from z (K,), Z (K, P) over a duration, s.
 
-        A stiff contact has tens of thousands of panels, whose nodes together take more memory than there is.
+        A stiff contact has tens of thousands of panels, whose nodes exceed the memory.
         """
         count = max(int(np.ceil(self._panels(duration) / _MOST)), 1)
         times = [*(duration * piece / count for piece in range(count)), duration]
@@ -76,10 +76,10 @@ class Series:
     def _panels(self, duration: float) -> int:
         return max(int(np.ceil(self.norm * abs(duration) / _NORM)), 1)
 
-    def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Course:
+    def course(self, z: np.ndarray, Z: np.ndarray, duration: float, nodes: bool) -> Trajectory:
         """Return the motion from z (K,), Z (K, k + P) over a duration, s; at nodes, or without any.
 
-        The first k columns are derivatives by what changes no flow.
+        The first k columns are derivatives that change no flow.
         """
         panels = self._panels(duration)
         step, (k, p) = duration / panels, Z.shape
@@ -91,7 +91,7 @@ class Series:
         _advance(*self._X, *self._D, p - self._numbers, z, Z, step, panels, places, *room, of_z, of_Z)
         time = ((np.arange(panels)[:, None] + places) * step).ravel()
         weight = np.resize(_WEIGHTS * step, len(time)) if nodes else time
-        return Course(time, weight, of_z, of_Z, z, Z)
+        return Trajectory(time, weight, of_z, of_Z, z, Z)
 
 
 @entry
@@ -99,9 +99,9 @@ def _advance(row, column, x, number, at, of, d, first, z, Z, step, panels, place
     """Advance z and Z in place over panels; set them at places of each. a, b: room for the terms of the series."""
     for panel in range(panels):
         set_terms(row, column, x, number, at, of, d, first, z, Z, step, a, b)
-        for place in range(len(places)):
-            node = panel * len(places) + place
-            set_sums(a, b, places[place], of_z[node], of_Z[node])
+        for i in range(len(places)):
+            node = panel * len(places) + i
+            set_sums(a, b, places[i], of_z[node], of_Z[node])
         set_sums(a, b, 1.0, z, Z)
 
 
@@ -132,18 +132,18 @@ def set_terms(row, column, x, number, at, of, d, first, z, Z, step, a, b):
 
 
 @kernel
-def set_sums(a, b, place, z, Z):
-    """Set z and Z to the sums of the series at a place of the step, 0 to 1."""
+def set_sums(a, b, x, z, Z):
+    """Set z and Z to the sums of the series at x of the step, 0 to 1."""
     terms = b.shape[0]
     for i in range(len(z)):
         sum_ = a[terms - 1, i]
         for j in range(terms - 2, -1, -1):
-            sum_ = sum_ * place + a[j, i]
+            sum_ = sum_ * x + a[j, i]
         z[i] = sum_
         for n in range(Z.shape[1]):
             sum_ = b[terms - 1, i, n]
             for j in range(terms - 2, -1, -1):
-                sum_ = sum_ * place + b[j, i, n]
+                sum_ = sum_ * x + b[j, i, n]
             Z[i, n] = sum_
 
 
@@ -196,12 +196,12 @@ def _step(flows, f, first, z, Z, step, panels, a, b):
 def _power(room, flows, f, step, panels, a, b):
     """Return the exponential (K, K) of flow f over panels: a power of that over one."""
     size = flows.forces.shape[2]
-    base, found, left = unit(room, size), unit(room, size), panels
+    base, power, left = unit(room, size), unit(room, size), panels
     _step(flows, f, size, vector(room, size), base, step, ZERO + 1, a, b)
     while left > 0:
         if left % 2 == 1:
-            found = product(room, found, base)
+            power = product(room, power, base)
         left //= 2
         if left > 0:
             base = product(room, base, base)
-    return found
+    return power

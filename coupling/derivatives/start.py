@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.derivatives.constraints import applied, begun, left_of, own_of, presses
+from vanedamp.coupling.derivatives.constraints import applied, begun, explicit_of, left_of, presses
 from vanedamp.coupling.derivatives.event_functions import generated
 from vanedamp.coupling.derivatives.impact import impact, scaled
 from vanedamp.coupling.derivatives.matrices import (
@@ -30,7 +30,7 @@ _NEAR, _ROUND_OFF = 1e-9, 1e-13
 def first_derivative(room, eq, turns, flows, walk, trace, start, f, z):
     """Return the derivative (2N, C) of z as segment `start` begins, in flow f, by the state there.
 
-    Where that is not the first, at the end of a period, the motion only passes: what a run that begins there does is no
+    Where that is not the first, at the end of a period, the motion only passes: what a run begun there does is no
     kink of it.
     """
     one, k = len(eq.unit), len(eq.scale)
@@ -60,7 +60,7 @@ def first_derivative(room, eq, turns, flows, walk, trace, start, f, z):
 
 @counting
 def _begin_run(room, eq, turns, flows, walk, trace, f, z, given, M):
-    """Change the derivative M (2N, C) of the start, a state u `given` (2N,), by what a run does there at once.
+    """Change the derivative M (2N, C) of the start, a state u `given` (2N,), as a run starts there.
 
     Notes whether other starts have a kink there.
     """
@@ -76,11 +76,11 @@ def _begin_run(room, eq, turns, flows, walk, trace, f, z, given, M):
         for i in range(size):
             v[i] = given[size + i] / eq.root[i]
         jump = impact(room, eq, turns, trace, ZERO, walk.law, v, trace.speed[0])
-        rates, own = scaled(room, eq, turns, jump, given[size:])
+        rates, offset = scaled(room, eq, turns, jump, given[size:])
         moved = product(room, rates, M[size:])
         for i in range(size):
             for c in range(M.shape[1]):
-                M[size + i, c] = moved[i, c] + (own[i, c - k] if c >= k else 0.0)
+                M[size + i, c] = moved[i, c] + (offset[i, c - k] if c >= k else 0.0)
     if _begins_at_event(room, eq, turns, flows, walk, trace, f, z, M) or _loose(
         room, eq, turns, flows, walk, trace, f, z, M
     ):
@@ -94,22 +94,22 @@ def _placed(room, eq, turns, walk, trace, start, z):
     Springs of friction dampers are unloaded to their bounds.
     """
     k, P, one, sliders, bodies = len(eq.scale), turns.numbers, len(eq.unit), len(eq.bound), len(eq.along)
-    kept, own, first = matrix(room, k, k + P), matrix(room, one, P), k - sliders
+    of_states, offset, first = matrix(room, k, k + P), matrix(room, one, P), k - sliders
     for s in range(k):
-        kept[s, s] = 1.0
+        of_states[s, s] = 1.0
         for p in range(P):
-            kept[s, k + p] = walk.turns[s, p]
+            of_states[s, k + p] = walk.turns[s, p]
     for j in range(sliders):
         elongation = walk.given[first + j]
         if abs(elongation) > eq.longest[j]:
-            kept[first + j, first + j] = 0.0
+            of_states[first + j, first + j] = 0.0
             for p in range(P):
                 bound = turns.limit[p, eq.jenkins + j] - eq.longest[j] * turns.tangential[p, j]
-                kept[first + j, k + p] = math.copysign(bound / eq.tangential[j], elongation * bound)
+                of_states[first + j, k + p] = math.copysign(bound / eq.tangential[j], elongation * bound)
     state = times(room, eq.to_state, z[:one])
     for p in range(P):
         for i in range(one):
-            own[i, p] = dot(turns.from_state[p, i], state)
+            offset[i, p] = dot(turns.from_state[p, i], state)
     pushed, count = integers(room, bodies), 0
     for b in range(bodies):
         slip, s = trace.q[start, eq.along[b]] - dot(eq.floor[b], trace.q[start]), 2 * eq.modes + b
@@ -117,16 +117,16 @@ def _placed(room, eq, turns, walk, trace, start, z):
             pushed[count] = s
             count += 1
     if count > 0:
-        _push(room, eq, turns, trace, start, z, kept, own, pushed[:count])
-    found = product(room, eq.from_state, kept)
+        _push(room, eq, turns, trace, start, z, of_states, offset, pushed[:count])
+    derivative = product(room, eq.from_state, of_states)
     for i in range(one):
         for p in range(P):
-            found[i, k + p] += own[i, p]
-    return found
+            derivative[i, k + p] += offset[i, p]
+    return derivative
 
 
 @counting
-def _push(room, eq, turns, trace, start, z, kept, own, pushed):
+def _push(room, eq, turns, trace, start, z, of_states, offset, pushed):
     """Let gaps of bodies that were pushed, states (m,) of their slips, stay closed where they are closed now."""
     k, one, shut = len(eq.scale), len(eq.unit), 0
     gap, rows = matrix(room, eq.contacts, k), integers(room, eq.contacts)
@@ -145,20 +145,20 @@ def _push(room, eq, turns, trace, start, z, kept, own, pushed):
             for s in range(k):
                 gap[shut, s] = 0.0
     for m in range(len(pushed)):
-        for c in range(kept.shape[1]):
-            kept[pushed[m], c] = 0.0
-    opened, of_pushed = product(room, gap[:shut], kept), matrix(room, shut, len(pushed))
+        for c in range(of_states.shape[1]):
+            of_states[pushed[m], c] = 0.0
+    opened, of_pushed = product(room, gap[:shut], of_states), matrix(room, shut, len(pushed))
     for a in range(shut):
         for m in range(len(pushed)):
             of_pushed[a, m] = gap[a, pushed[m]]
         for p in range(turns.numbers):
-            opened[a, k + p] += own_of(turns, p, rows[a], z, GAPS)
+            opened[a, k + p] += explicit_of(turns, p, rows[a], z, GAPS)
             for i in range(one):
-                opened[a, k + p] += eq.gap[rows[a], i] * own[i, p]
+                opened[a, k + p] += eq.gap[rows[a], i] * offset[i, p]
     moved = product(room, inverse_of_rows(room, of_pushed), opened)
     for m in range(len(pushed)):
-        for c in range(kept.shape[1]):
-            kept[pushed[m], c] = -moved[m, c]
+        for c in range(of_states.shape[1]):
+            of_states[pushed[m], c] = -moved[m, c]
 
 
 @counting
@@ -234,10 +234,10 @@ def _loose(room, eq, turns, flows, walk, trace, f, z, M):
     for r in range(eq.contacts, eq.jenkins):
         if not flows.stuck[f, r] or abs(force[units + r]) < (1.0 - _NEAR) * eq.limit[r]:
             continue
-        beside = False
+        pushed = False
         for other in range(eq.contacts if eq.floor_unit[r] else 0):
             closed = eq.spring[other] == math.inf and presses(trace.state[0, other])
-            beside = beside or (closed and eq.J[other, eq.along[eq.body[r]]] != 0.0)
-        if not beside:
+            pushed = pushed or (closed and eq.J[other, eq.along[eq.body[r]]] != 0.0)
+        if not pushed:
             return True
     return False

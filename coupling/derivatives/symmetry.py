@@ -47,11 +47,11 @@ def mirror_of(system: System) -> Symmetry | None:
 
 
 def wave_of(scene: Scene, system: System) -> Symmetry | None:
-    """Return the symmetry of a travelling wave: each sector does what another one has done, a part of a period later.
+    """Return the symmetry of a travelling wave: each sector repeats another, a part of a period later.
 
     Of a ring whose cavities "name@sector" are alike in M sectors, in equal steps, under loads that lag by 2 pi m/M from
     one to the next: with g the greatest common divisor of M and m, the part of the period is g/M, and the motion of
-    sector j then was that of sector j - s, s m = g modulo M. None for a scene without that symmetry.
+    sector j then was that of sector j - s, s m = g modulo M. None without that symmetry.
     """
     after = _next_sector(scene, system)
     if after is None or len(system.tangential):
@@ -67,7 +67,7 @@ def wave_of(scene: Scene, system: System) -> Symmetry | None:
 
 
 def _next_sector(scene: Scene, system: System) -> tuple[np.ndarray, int] | None:
-    """Return for each body (b,) the one in its place in the next sector with bodies, and the number of such sectors."""
+    """Return each body's (b,) counterpart in the next sector with bodies, and the number of such sectors."""
     named = [scene.cavity[index].name.rpartition("@") for index in system.cavity]
     if not named or not all(at and sector.isdecimal() for _, at, sector in named):
         return None
@@ -88,9 +88,9 @@ def _next_sector(scene: Scene, system: System) -> tuple[np.ndarray, int] | None:
 
 
 def _shift(system: System, after: np.ndarray, part: float) -> np.ndarray:
-    """Return the orthogonal map (N, N) that puts each sector in the place of the one before, as well as there is one.
+    """Return the orthogonal map (N, N) that shifts each sector to the one before, as far as possible.
 
-    Among modes of one frequency the floors and the loads, which turn by a part of a period, tell it (Procrustes).
+    Among modes of one frequency the floors and the loads, which turn by a part of a period, decide (Procrustes).
     """
     n, load = system.modes, system.load[:, : system.modes]
     turned = load * np.exp(2j * np.pi * part * system.order)[:, None]

@@ -7,12 +7,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
+from vanedamp.coupling.derivatives.dynamics import Flow, ScaledDynamics
 from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.flow_table import FlowTable, table_of
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.impact import PLASTIC
-from vanedamp.coupling.derivatives.numbers import Numbers
+from vanedamp.coupling.derivatives.numbers import Parameters
 from vanedamp.coupling.derivatives.passage import Crossing, Passage, PassageStatus
 from vanedamp.coupling.derivatives.passing import end_walk, walk_along
 from vanedamp.coupling.derivatives.saltation import SIMULTANEOUS
@@ -41,7 +41,7 @@ from vanedamp.coupling.engine.trace import COUNT, COURSE, Leg, Trace, leg_of
 from vanedamp.coupling.response.records import new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import fitted
-from vanedamp.coupling.response.segment import Event, EventRun
+from vanedamp.coupling.response.segment import EventRun, SegmentEnd
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.tangents.differences import NotSmooth, derivative
@@ -70,7 +70,7 @@ class Before(NamedTuple):
     """A moment of a motion: its segment, the event that ends it, its flow, z (K,) there, and M (2N, k + P)."""
 
     segment: Leg
-    event: Event
+    event: SegmentEnd
     flow: Flow
     z: np.ndarray
     M: np.ndarray
@@ -81,7 +81,7 @@ class Before(NamedTuple):
         return self.z[: self.flow.dynamics.one]
 
 
-class Watch(Protocol):
+class WalkObserver(Protocol):
     """Measures a motion and its derivatives M (2N, k + P): by the start, in units of its sizes, then by numbers.
 
     nears: whether events that nearly happen are sought, too.
@@ -90,7 +90,7 @@ class Watch(Protocol):
     nears: bool
 
     def begin(self, unheld: np.ndarray) -> None:
-        """Take the derivative (2N, k + P) of the start as it is given, before what sticks is stopped."""
+        """Take the derivative (2N, k + P) of the given start, before sticking rows are stopped."""
 
     def segment(self, begun: Before, duration: float) -> None:
         """Take the motion over a duration, s, until the next event. begun: its start, with the derivative there."""
@@ -106,15 +106,15 @@ class PassageWalk:
     """One passage from a state (k,), with its derivative or without, and by numbers of the scene if they are given.
 
     turns: (k, P) how numbers change the start; watch: is called with the course of every segment; given: whether the
-    motion begins so whatever happens: then only what numbers change may make it kink there;
+    motion begins so whatever happens: then only numbers may make it kink there;
     reached: state (k,) and derivatives (k, k) and (k, P) some part of a period, or periods, after the start, of a
     passage without its derivative only the state; None without a part, or if the engine has not come so far; short:
     whether the passage ends there, its own end unknown.
     """
 
     def __init__(
-        self, dynamics: Dynamics, names: EventNames, state: np.ndarray, derivative: bool = True,
-        numbers: Numbers | None = None, turns: np.ndarray | None = None, watch: Watch | None = None,
+        self, dynamics: ScaledDynamics, names: EventNames, state: np.ndarray, derivative: bool = True,
+        numbers: Parameters | None = None, turns: np.ndarray | None = None, watch: WalkObserver | None = None,
         given: bool = False, part: float = np.inf, short: bool = False,
     ) -> None:  # fmt: skip
         self._dynamics, self._names, self._whole, self._state = dynamics, names, derivative, state
@@ -236,12 +236,12 @@ class PassageWalk:
 
 
 def periods_from(
-    dynamics: Dynamics, state: np.ndarray, periods: int, earlier: list[EventRun]
+    dynamics: ScaledDynamics, state: np.ndarray, periods: int, earlier: list[EventRun]
 ) -> Iterator[tuple[np.ndarray, np.ndarray, PassageStatus]]:
     """Yield the state (k,) at the end of every period of a motion, its derivative (k, k) by that at the period's start.
 
-    And its defect: what makes none, ends the motion. One run passes all periods; earlier: as of `run_from`, and the one
-    that is left. Derivatives are as those of a passage of one period, but that a run begins there is no kink.
+    And its defect, which ends the motion. One run passes all periods; earlier: as of `run_from`, and the one
+    that is left. Derivatives are of a one-period passage, without a kink at the start.
     """
     frame = dynamics.frame
     made = _Made(table_of(dynamics, None), state, None, False, None)
@@ -251,8 +251,8 @@ def periods_from(
 
     def ended(state: np.ndarray) -> tuple[np.ndarray, np.ndarray, PassageStatus]:
         agrees = end_walk(*made.records(trace), state, float(done + 1))
-        found = made.derivatives(made.before(trace, made.done - 1), done + 1)[0]
-        return state, found if agrees else np.full_like(found, np.nan), made.status
+        slopes = made.derivatives(made.before(trace, made.done - 1), done + 1)[0]
+        return state, slopes if agrees else np.full_like(slopes, np.nan), made.status
 
     for part, trace in enumerate(run.course(periods, made.segments)):
         if part:
@@ -277,13 +277,13 @@ def periods_from(
 
 
 class _Made:
-    """The derivative of a passage as it is made in compiled code, with what Python finds for that.
+    """The derivative of a passage as made in compiled code, with data that Python finds.
 
     flows: of the segments of the present course.
     """
 
     def __init__(
-        self, table: FlowTable, state: np.ndarray, turns: np.ndarray | None, given: bool, watch: Watch | None
+        self, table: FlowTable, state: np.ndarray, turns: np.ndarray | None, given: bool, watch: WalkObserver | None
     ) -> None:
         self._table, self._dynamics, self._numbers = table, table.dynamics, table.numbers
         self.flows = list[Flow]()
@@ -307,24 +307,24 @@ class _Made:
 
     @property
     def segments(self) -> int:
-        """Segments of a course that there is room for."""
+        """Segments of a course there is room for."""
         return self._table.segments
 
     def until(self, time: float, short: bool) -> None:
-        """Keep what there is at a time after the start, s; short: and end there."""
+        """Keep the state at a time after the start, s; short: and end there."""
         self._walk.part[0], self._walk.at[SHORT] = time, short
 
     def records(self, trace: Trace) -> tuple[object, ...]:
-        """Return what compiled functions take."""
+        """Return the records for compiled functions."""
         return self._table.equations, self._table.turns, self._table.stack, trace, self._walk, self._table.room
 
     def walk(self, trace: Trace) -> None:
-        """Go on to the present end of a course."""
+        """Continue to the present end of a course."""
         walk = self._walk
         while True:
             outcome = walk_along(*self.records(trace))
-            # their places may be taken by others later
-            self.flows += [self._table.flows[place] for place in walk.flows[len(self.flows) : walk.at[NEXT]]]
+            # others may replace them later
+            self.flows += [self._table.flows[index] for index in walk.flows[len(self.flows) : walk.at[NEXT]]]
             if outcome == KNOWN:
                 return
             if outcome == WANTS_FLOW:
@@ -337,7 +337,7 @@ class _Made:
                 walk.at[SMOOTH] = _set_slopes(self._dynamics.system, trace, e, walk.law)
 
     def turn(self) -> None:
-        """Go on with a course whose last segment is the first now."""
+        """Continue a course from its last segment."""
         self._walk.at[NEXT], self._walk.at[LAW_OF], self.flows = 1, -1, self.flows[-1:]
 
     @property
@@ -369,8 +369,8 @@ class _Made:
     def before(self, trace: Trace, i: int) -> Before:
         """Return the end of segment i, of those that are not kept the last."""
         leg, walk, one = leg_of(trace, i, self._dynamics.system.period), self._walk, self._dynamics.one
-        kept = walk.at[KEEPS]
-        z, M = (walk.z_ends[i], walk.ends[i]) if kept else (walk.z, walk.end[:one])
+        keeps = walk.at[KEEPS]
+        z, M = (walk.z_ends[i], walk.ends[i]) if keeps else (walk.z, walk.end[:one])
         return Before(leg, leg.event, self.flows[i], z.copy(), M.copy())
 
     @property

@@ -1,4 +1,4 @@
-"""A passage on its way, as compiled functions keep it, and the codes of what comes of it."""
+"""A passage under way in compiled functions, and its outcome codes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vanedamp.coupling.numerics.compiler.record import record_with
 GAPS, SPEEDS = np.int64(0), np.int64(1)
 #: defects of a derivative, each worse than the one before (passage.PassageStatus)
 OK, GRAZING, COINCIDENT, UNDETERMINED, STOPPED = range(5)
-#: what comes of an event: its derivative is known, or there is none; or Python is to find a flow, slopes of a law, room
+#: outcome of an event: its derivative is known, or there is none; or Python is to find a flow, slopes of a law, room
 KNOWN, UNTRUSTED, WANTS_FLOW, WANTS_LAW, WANTS_ROOM = range(5)
 
 # numbers of a walk: segments of the course passed; their flow, -1: none yet; defect so far; whether a chatter was
@@ -38,7 +38,7 @@ class Walking(NamedTuple):
     at: Annotated[np.ndarray, "numbers", int]
     given: Annotated[np.ndarray, "k"]  # the state with which the passage is to begin
     turns: Annotated[np.ndarray, "k P"]  # how numbers change it
-    unheld: Annotated[np.ndarray, "2N C"]  # derivative of the start before units at rest stop what it would move
+    unheld: Annotated[np.ndarray, "2N C"]  # derivative of the start before units at rest stop it
     wanted: Annotated[np.ndarray, "u", int]  # states of a flow that Python is to find
     wanted_force: Annotated[np.ndarray, "2u"]
     law: Annotated[np.ndarray, "3 u"]  # restitutions in an event, their slopes by speed and by coefficient

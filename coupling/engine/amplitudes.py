@@ -1,4 +1,4 @@
-"""Changes of the amplitudes of modes over a time, and what they add to a row. Records as in either engine."""
+"""Changes of the amplitudes of modes over a time, and their effect on a row. Records as in either engine."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _add_driven_growth(eigenvalue, driven, load, phase, gain, bend, tau):
 
 @summing
 def row_change(motion, velocity, bend, gain, count):
-    """Return what the modes add to displacement and velocity of a row or a coordinate."""
+    """Return the modes' part of displacement and velocity of a row or a coordinate."""
     shift, speed = 0.0, 0.0
     for j in range(count):
         shift += motion[j].real * bend[j].real - motion[j].imag * bend[j].imag

@@ -14,7 +14,7 @@ from vanedamp.coupling.system.system import System
 def engine_run(
     system: System, start: RestartState, records: Records, events: bool, max_events: int, linearisation: float = 0.01
 ) -> EventRun:  # fmt: skip
-    """Return a run of the engine that takes all of a system: of sliders, or for bodies in the plane.
+    """Return a run of the engine that takes all of a system: of sliders, or for planar bodies.
 
     linearisation: largest shortening of a tilted body over its play for a status ok. Kernels are loaded when they are
     wanted.

@@ -10,7 +10,7 @@ from vanedamp.coupling.numerics.tolerances import NEARLY_EQUAL
 def coalesce(rate: np.ndarray, vectors: np.ndarray, inverse: np.ndarray) -> bool:
     """Return whether some modes nearly coalesce, by the condition of each eigenvalue (m,), lengths by energy.
 
-    vectors (2q, m) and their inverse (m, 2q), of pairs one of them, twice: on coordinates and rates of unit mass.
+    vectors (2q, m) and their inverse (m, 2q), of pairs one, twice: on coordinates and rates of unit mass.
     """
     energy = np.ones((len(vectors), len(rate)))
     energy[: len(vectors) // 2] = np.abs(rate)

@@ -1,4 +1,4 @@
-"""Many scenes that differ in numbers: what differs between their systems, as columns over one of them.
+"""Many scenes that differ in numbers: their systems' differences, as columns over one.
 
 Scenes that differ only in frequency, level, gaps, friction, restitution and starts have one structure, one set of
 contact states and one length of run; the columns hold what differs, with the same digits as systems assembled one by
@@ -29,7 +29,7 @@ STARTS = (
 )  # fmt: skip
 LEVELS = ("excitation.force", "excitation.resonance_amplitude")
 
-#: keys whose numbers change no more than their columns, of bodies in the plane, too
+#: keys whose numbers change no more than their columns, of planar bodies, too
 _KNOWN = ("frequency", "force", "resonance_amplitude", "displacement", "velocity", "position")
 _PLACES = re.compile(
     r"(?P<table>excitation|initial|cavity|damper|friction_damper)(\.(?P<entry>[^.]+))?\."
@@ -44,7 +44,7 @@ _KEYS = {
 
 @record_with(free_axes=1)
 class Columns(NamedTuple):
-    """What differs between k scenes; r: rows of sliders (LineSystem), or units of bodies in the plane (System)."""
+    """Differences of k scenes; r: rows of sliders (LineSystem), or units of planar bodies (System)."""
 
     omega: Annotated[np.ndarray, "k"]
     period: Annotated[np.ndarray, "k"]
@@ -59,7 +59,7 @@ class Columns(NamedTuple):
     restitution: Annotated[np.ndarray, "k r"]
     holds: Annotated[np.ndarray, "k b"]
     neglected: Annotated[np.ndarray, "k b"]
-    # STARTS, those across the cavity of bodies in the plane only
+    # STARTS, those across the cavity of planar bodies only
     displacement: Annotated[np.ndarray, "k n"]
     velocity: Annotated[np.ndarray, "k n"]
     slip: Annotated[np.ndarray, "k b"]
@@ -73,10 +73,10 @@ class Columns(NamedTuple):
 
 def entries_of(scene: Scene, path: str) -> tuple[str, list[int], str] | None:
     """Return table, numbers of its entries and key of a path to a number that has a column; None for others."""
-    found = _PLACES.fullmatch(path)
-    if found is None or found["key"] not in _KEYS[found["table"]] or _in_the_way(scene, found["table"], found["key"]):
+    match = _PLACES.fullmatch(path)
+    if match is None or match["key"] not in _KEYS[match["table"]] or _in_the_way(scene, match["table"], match["key"]):
         return None
-    table, entry, key = found["table"], found["entry"], found["key"]
+    table, entry, key = match["table"], match["entry"], match["key"]
     if table in ("excitation", "initial"):
         return None if entry else (table, [], key)
     rows = getattr(scene, table)
@@ -100,7 +100,7 @@ def _in_the_way(scene: Scene, table: str, key: str) -> bool:
         return getattr(excitation, key) is None or excitation.distributed or any(scene.elements) or _pulled(scene)
     if table == "initial":
         return any(scene.elements) or not hasattr(scene.structure, "mass")
-    if table == "friction_damper":  # in more than one place of bodies in the plane
+    if table == "friction_damper":  # more than once, of planar bodies
         return scene.planar
     if key == "restitution":
         return law.depends_on_speed or type(law).element is not ContactLaw.element
@@ -126,45 +126,45 @@ def repeated(whole: System, system: Any, start: RestartState, size: int = 1) -> 
     return Columns(*(np.repeat(np.asarray(value)[None], size, axis=0) for value in row))
 
 
-def set_excitation(scene: Scene, whole: System, found: Columns, values: Mapping[str, np.ndarray]) -> None:
+def set_excitation(scene: Scene, whole: System, batch: Columns, values: Mapping[str, np.ndarray]) -> None:
     """Set frequency and level of scenes from those among some numbers, (k,) each by path."""
     for path, numbers in values.items():
         if path == "excitation.frequency":
-            found.omega[:] = 2 * np.pi * numbers
-            found.period[:] = 2 * np.pi / found.omega
-            found.frequency[:] = found.omega[:, None] * whole.order
+            batch.omega[:] = 2 * np.pi * numbers
+            batch.period[:] = 2 * np.pi / batch.omega
+            batch.frequency[:] = batch.omega[:, None] * whole.order
         elif path in LEVELS:
             level = numbers if path.endswith("force") else numbers / chosen_resonance(scene).flexibility
             basis = basis_of(scene)
             shapes = force_shapes(scene, basis, interface_row(basis, forced_label(scene), "excitation.at"))
-            found.load[:, :, : shapes.shape[1]] = shapes * -1j * level[:, None, None]
+            batch.load[:, :, : shapes.shape[1]] = shapes * -1j * level[:, None, None]
 
 
-def set_starts(scene: Scene, found: Columns, values: Mapping[str, np.ndarray]) -> None:
+def set_starts(scene: Scene, batch: Columns, values: Mapping[str, np.ndarray]) -> None:
     """Set with which motion scenes begin, and where bodies are, from those among some numbers, (k,) each by path."""
     gaps, places = dict[int, np.ndarray](), dict[int, np.ndarray]()
     for path, numbers in values.items():
-        place = entries_of(scene, path)
-        assert place is not None
-        table, entries, key = place
+        entry = entries_of(scene, path)
+        assert entry is not None
+        table, entries, key = entry
         if table == "initial":
-            getattr(found, key)[:] = numbers[:, None]
+            getattr(batch, key)[:] = numbers[:, None]
         elif key == "gap":
             gaps |= dict.fromkeys(entries, numbers)
         elif key == "position":
             places |= dict.fromkeys(entries, numbers)
         elif key == "velocity":
-            found.slip_velocity[:, entries] = numbers[:, None]
+            batch.slip_velocity[:, entries] = numbers[:, None]
     for index, cavity in enumerate(scene.cavity):
         row = scene.bodies_in(cavity)
         if index in gaps or not places.keys().isdisjoint(row):
             given = [places.get(number, scene.damper[number].position) for number in row]
-            for number, own in zip(row, spread(given, gaps.get(index, cavity.gap)), strict=True):
-                found.slip[:, number] = own
+            for number, slip in zip(row, spread(given, gaps.get(index, cavity.gap)), strict=True):
+                batch.slip[:, number] = slip
 
 
 def system_in(whole: System, table: Columns, k: int, units: np.ndarray) -> System:
-    """Return the system of scene k, with what its columns say of some units (c,), behind one another there."""
+    """Return the system of scene k, with its columns of some units (c,), in a row."""
     rest, play, load = whole.rest.copy(), whole.play.copy(), whole.load.copy()
     behind = table.rest.shape[1] - len(units)
     rest[units], play[units] = table.rest[k, behind:], table.play[k, behind:]
@@ -176,18 +176,18 @@ def system_in(whole: System, table: Columns, k: int, units: np.ndarray) -> Syste
 
 
 def columned(scene: Scene, paths: Iterable[str]) -> list[str]:
-    """Return those of some paths whose numbers have columns in scenes like this one."""
+    """Return the paths with columns in scenes like this one."""
     if scene.excitation.signal is not None:
         return []
-    own = [path for path in paths if entries_of(scene, path) is not None]
+    batched = [path for path in paths if entries_of(scene, path) is not None]
     # a number of a body or a cavity is one of each sector's, which may scatter about it
-    return [path for path in own if path.startswith("excitation.")] if scene.repeats else own
+    return [path for path in batched if path.startswith("excitation.")] if scene.repeats else batched
 
 
 def foreseen(scene: Scene, paths: Iterable[str]) -> list[str]:
-    """Return those of some paths whose columns are known without the systems of the scenes.
+    """Return the paths with columns known without the scenes' systems.
 
-    Of bodies in the plane, gaps, friction and restitution enter in more than one place.
+    Of planar bodies, gaps, friction and restitution enter more than once.
     """
-    found = columned(scene, paths)
-    return [path for path in found if path.rpartition(".")[2] in _KNOWN] if scene.planar else found
+    names = columned(scene, paths)
+    return [path for path in names if path.rpartition(".")[2] in _KNOWN] if scene.planar else names

@@ -67,7 +67,7 @@ def add_segment(system, flows, st, rec, scratch, s, period, tau, constant, grows
 
 @kernel
 def _highest(system, flows, st, scratch, s, response, tau, constant, grows, peak, side):
-    """As `highest`, in one place for all but the response itself."""
+    """As `highest`, for all but the response itself."""
     return highest(system, flows, st, scratch, s, response, tau, constant, grows, peak, side)
 
 
@@ -86,12 +86,12 @@ def _add_outputs(system, flows, st, rec, scratch, s, period, tau, grows):
     if deflected:
         _integrate_amplitudes(flows, st, scratch, s, tau, count)
     for k in range(rec.outputs.shape[1]):
-        row, constant, found = flows.outputs[s, k], st.offset[1 + k], rec.outputs[period, k]
+        row, constant, output = flows.outputs[s, k], st.offset[1 + k], rec.outputs[period, k]
         if deflected:
-            _extremes(system, flows, st, scratch, s, row, tau, constant, grows, found)
-            found[2] += constant * tau + _real_part(row, scratch.total, count)
+            _extremes(system, flows, st, scratch, s, row, tau, constant, grows, output)
+            output[2] += constant * tau + _real_part(row, scratch.total, count)
         else:
-            found[0] = _highest(system, flows, st, scratch, s, row, tau, constant, grows, found[0], 0.0)
+            output[0] = _highest(system, flows, st, scratch, s, row, tau, constant, grows, output[0], 0.0)
 
 
 @kernel
@@ -106,9 +106,9 @@ def _note_course(system, flows, st, rec, scratch, s, period, tau, grows):
         rate, c, reach = flows.eigenvalue[s, j], st.amplitude[j], 0.0
         for k in range(len(outputs)):
             reach += abs(outputs[k, j].real) + abs(outputs[k, j].imag)
-        part, square = reach * (abs(c.real) + abs(c.imag)), rate.real * rate.real + rate.imag * rate.imag
-        size += part
-        eighth += part * square * square * square * square
+        term, square = reach * (abs(c.real) + abs(c.imag)), rate.real * rate.real + rate.imag * rate.imag
+        size += term
+        eighth += term * square * square * square * square
         for h in range(flows.driven.shape[1] - 1):
             if flows.driven[s, h] <= j < flows.driven[s, h + 1]:
                 drive = reach * flows.load[s, j] * st.amplitude[h]
@@ -132,12 +132,12 @@ def _note_outputs(flows, st, rec, s, value, count, period, ahead):
     rec.noted[0] += 1
     row[0], row[1] = period, ahead
     for d in range(4):
-        part = row[2 + d * len(outputs) :]
+        entries = row[2 + d * len(outputs) :]
         for k in range(len(outputs)):
             total = st.offset[1 + k] if d == 0 else 0.0
             for j in range(count):
                 total += outputs[k, j].real * value[j].real - outputs[k, j].imag * value[j].imag
-            part[k] = total
+            entries[k] = total
         for h in range(flows.driven.shape[1] - 1):  # c' = rate c + load phase
             for j in range(flows.driven[s, h], flows.driven[s, h + 1]):
                 value[j] = flows.eigenvalue[s, j] * value[j] + flows.load[s, j] * value[h]
@@ -251,7 +251,7 @@ def _linear_forms(system, flows, st, rec, scratch, s, period, count):
 
 @inlined
 def _mapped(linear, first, change, total, count):
-    """Return the map of two numbers in four columns from `first` of the changes, and that of the sums, each x + i y."""
+    """Return the map of two numbers in four columns from `first` of the changes, and of the sums, each x + i y."""
     on_x, on_y, old_x, old_y = 0.0, 0.0, 0.0, 0.0
     for j in range(count):
         row, dr, di, tr, ti = linear[j], change[2 * j], change[2 * j + 1], total[2 * j], total[2 * j + 1]
@@ -331,20 +331,20 @@ def _calm_integrals(flows, st, s, first, tau, constant):
     x0, x1, x2, x3, x4, x5, x6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(first, flows.slow_count[s]):
         j = flows.slow[s, i, 0]
-        z, part = flows.eigenvalue[s, j] * tau, flows.response[s, j] * st.amplitude[j]
-        x0 += part.real
-        part *= z
-        x1 += part.real
-        part *= z * (1 / 2)
-        x2 += part.real
-        part *= z * (1 / 3)
-        x3 += part.real
-        part *= z * (1 / 4)
-        x4 += part.real
-        part *= z * (1 / 5)
-        x5 += part.real
-        part *= z * (1 / 6)
-        x6 += part.real
+        z, term = flows.eigenvalue[s, j] * tau, flows.response[s, j] * st.amplitude[j]
+        x0 += term.real
+        term *= z
+        x1 += term.real
+        term *= z * (1 / 2)
+        x2 += term.real
+        term *= z * (1 / 3)
+        x3 += term.real
+        term *= z * (1 / 4)
+        x4 += term.real
+        term *= z * (1 / 5)
+        x5 += term.real
+        term *= z * (1 / 6)
+        x6 += term.real
     series, total, mean = (x0, x1, x2, x3, x4, x5, x6), 0.0, 0.0
     for i in range(7):
         mean += series[i] / (i + 1.0)
@@ -375,8 +375,8 @@ def _driven_integral(c, decay, drive, other, other_decay, other_drive):
         c, other = decay * c, other_decay * other
         if n == 1:
             c, other = c + drive, other + other_drive
-        part = 1.0 / n
-        product, c, other = part * product, part * c, part * other
+        scale = 1.0 / n
+        product, c, other = scale * product, scale * c, scale * other
         total += product * (1.0 / (n + 1.0))
         if n > 2 and abs(product.real) + abs(product.imag) <= LAST_TERM * (abs(total.real) + abs(total.imag)):
             break
@@ -404,10 +404,10 @@ def at_point(system, flows, st, rec, scratch, s, tau, i, points):
     t, weight = (i // rule + 0.5 + 0.5 * _NODES[i % rule]) * width, 0.5 * width * _WEIGHTS[i % rule]
     _amplitudes_at(flows, st, s, t, value, count)
     for j in range(count):
-        part = (flows.response[s, j] * value[j]).real
-        x += part
+        term = (flows.response[s, j] * value[j]).real
+        x += term
         # add_segment has the square of calm modes
-        calm += part if 2.0 * abs(flows.eigenvalue[s, j]) * system.period < SLOW else 0.0
+        calm += term if 2.0 * abs(flows.eigenvalue[s, j]) * system.period < SLOW else 0.0
     rec.square[st.counters[PERIOD]] += weight * (x * x - calm * calm)
     return weight
 

@@ -2,7 +2,7 @@
 
 A segment's integral is the form at its end less the form at its start. Where the rate by which a product of two modes
 changes vanishes relative to the frequency, the form would cancel: such pairs are left out of the forms, and listed.
-Flows and scratch space are those of either engine, whose fields have the same names.
+Flows and scratch space are either engine's.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ def new_form_scratch(modes: int, coordinates: int, factors: int) -> FormScratch:
 
 
 @kernel
-def take_factor(left, right, weight, place, m, forms):
-    """Take two functionals of the modes as factors `place`, the last ones, of their products, by a weight."""
+def take_factor(left, right, weight, index, m, forms):
+    """Take two functionals of the modes as factors `index`, the last ones, of their products, by a weight."""
     for j in range(m):
-        forms.left[0, j, place], forms.left[1, j, place] = left[j].real, left[j].imag
-        forms.right[0, j, place], forms.right[1, j, place] = weight * right[j].real, weight * right[j].imag
-        forms.span[j, 0], forms.span[j, 1] = 0, place + 1
+        forms.left[0, j, index], forms.left[1, j, index] = left[j].real, left[j].imag
+        forms.right[0, j, index], forms.right[1, j, index] = weight * right[j].real, weight * right[j].imag
+        forms.span[j, 0], forms.span[j, 1] = 0, index + 1
 
 
 @inlined
@@ -70,15 +70,15 @@ def _is_slow(rate, period):
 def set_linear(system, flows, s, m, forms):
     """Set the linear maps, by the columns of numerics.codes."""
     e, linear, driven, load = len(system.frequency), flows.linear[s], flows.driven[s], flows.load[s]
-    along, against, part = forms.along, forms.against, forms.integral
+    along, against, integral = forms.along, forms.against, forms.integral
     for j in range(m):
         rate, free = flows.eigenvalue[s, j], forms.free[j]
         along[j] = 0.0j if _is_slow(rate, system.period) else forms.inverse_rate[j]
-        part[0, j] = flows.response[s, j]
+        integral[0, j] = flows.response[s, j]
         linear[j, FREE_MOMENTUM_MAP], linear[j, FREE_MOMENTUM_MAP + 1] = free.real, -free.imag
-    _integrate(part[0], along, driven, load, m)
+    _integrate(integral[0], along, driven, load, m)
     for j in range(m):
-        linear[j, MEAN_MAP], linear[j, MEAN_MAP + 1] = 2.0 * part[0, j].real, -2.0 * part[0, j].imag
+        linear[j, MEAN_MAP], linear[j, MEAN_MAP + 1] = 2.0 * integral[0, j].real, -2.0 * integral[0, j].imag
     for h in range(e):
         turn = flows.eigenvalue[s, h]
         for j in range(m):
@@ -91,23 +91,23 @@ def set_linear(system, flows, s, m, forms):
             for i in range(system.load.shape[1]):
                 with_load += system.load[h, i] * forms.speed[j, i]
                 with_conjugate += system.load[h, i].conjugate() * forms.speed[j, i]
-            flows.work[s, h, j], part[0, j], part[1, j] = with_conjugate, with_load, with_conjugate
-        _integrate(part[0], along, driven, load, m)
-        _integrate(part[1], against, driven, load, m)
+            flows.work[s, h, j], integral[0, j], integral[1, j] = with_conjugate, with_load, with_conjugate
+        _integrate(integral[0], along, driven, load, m)
+        _integrate(integral[1], against, driven, load, m)
         for j in range(m):
-            on_x, on_y = 0.5 * (part[0, j] + part[1, j]), 0.5j * (part[0, j] - part[1, j])
+            on_x, on_y = 0.5 * (integral[0, j] + integral[1, j]), 0.5j * (integral[0, j] - integral[1, j])
             first = WORK_MAP + 4 * h
             linear[j, first], linear[j, first + 1] = on_x.real, -on_x.imag
             linear[j, first + 2], linear[j, first + 3] = on_y.real, -on_y.imag
         if h == 0:
             for j in range(m):
-                part[0, j], part[1, j] = flows.response[s, j], flows.response[s, j]
-                part[2, j], part[3, j] = flows.momentum[s, j], flows.momentum[s, j]
+                integral[0, j], integral[1, j] = flows.response[s, j], flows.response[s, j]
+                integral[2, j], integral[3, j] = flows.momentum[s, j], flows.momentum[s, j]
             for i in range(4):
-                _integrate(part[i], against if i % 2 == 0 else along, driven, load, m)
+                _integrate(integral[i], against if i % 2 == 0 else along, driven, load, m)
             for j in range(m):
-                _set_map(linear[j], HARMONIC_MAP, 0.5 * part[0, j], 0.5 * part[1, j].conjugate())
-                _set_map(linear[j], MOMENTUM_MAP, 0.5 * part[2, j], 0.5 * part[3, j].conjugate())
+                _set_map(linear[j], HARMONIC_MAP, 0.5 * integral[0, j], 0.5 * integral[1, j].conjugate())
+                _set_map(linear[j], MOMENTUM_MAP, 0.5 * integral[2, j], 0.5 * integral[3, j].conjugate())
 
 
 @inlined
@@ -229,7 +229,7 @@ def _multiply(left, right, span, m, both, mixed):
 
 @summing
 def _integrate_by_parts(product, reciprocals, driven, load, m, plain):
-    """Take what driven modes add to the products of their harmonics; plain: symmetric products, otherwise Hermitian."""
+    """Add driven modes to the products of their harmonics; plain: symmetric products, otherwise Hermitian."""
     e = len(driven) - 1
     for j in range(m - 1, -1, -1):  # harmonics, with which these products are summed, last
         for h in range(min(j + 1, e)):

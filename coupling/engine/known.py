@@ -31,32 +31,32 @@ class IllConditioned(ArithmeticError):
 def with_free_place(stack: Any, filled: np.ndarray, empty: Callable[[int], Any], used: np.ndarray) -> tuple[Any, int]:
     """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
 
-    A full stack is replaced by one of twice its size, `empty(size)`, all zeros: what is not filled takes no memory.
+    A full stack is replaced by one of twice its size, `empty(size)`, all zeros: unfilled entries take no memory.
     Many bodies close in more combinations than memory holds: a stack that has grown to ROOM gives away, as it is, the
-    place that has waited longest, by the times (s,) at which places were last used.
+    least recently used index, by times (s,) of use.
     """
     free = np.flatnonzero(filled == 0)
     if len(free):
         return stack, int(free[0])
     size = len(filled)
-    if 2 * sum(part.nbytes for part in stack) > ROOM:
+    if 2 * sum(array.nbytes for array in stack) > ROOM:
         return stack, int(np.argmin(used))
     larger = empty(2 * size)
-    for part, old in zip(larger, stack, strict=True):
-        part[:size] = old
+    for array, old in zip(larger, stack, strict=True):
+        array[:size] = old
     return larger, size
 
 
 def places(empty: Callable[[int], Any], room: int) -> int:
-    """Return how many places of a stack `empty(size)` so many bytes hold, all zeros of which take no memory."""
-    return max(4, room // sum(part.nbytes for part in empty(1)))
+    """Return how many entries of `empty(size)` so many bytes hold; zeros take no memory."""
+    return max(4, room // sum(array.nbytes for array in empty(1)))
 
 
 class Known:
-    """The subsystems met of late, of a system and of those that differ from it by what the excitation decides.
+    """The subsystems met of late, of a system and of those that differ in the excitation.
 
     empty: returns storage for subsystems of a system, for some number of them (None: a few); of: returns their fields
-    by name, from a system and its key; same: tells which places have a key in a system.
+    by name, from a system and its key; same: tells which entries have a key in a system.
     """
 
     def __init__(
@@ -69,15 +69,15 @@ class Known:
         return bool(self.stack.number.any())
 
     def place(self, system: Any, key: np.ndarray) -> int:
-        """Return the place in the stack of the subsystem of a key, closed rows or states, which is found if it is new.
+        """Return the index of the subsystem of a key, closed rows or states, computed if new.
 
         Raises IllConditioned for one that doubles cannot resolve.
         """
-        found = np.flatnonzero((self.stack.number > 0) & self._same(self.stack, system, key))
-        if len(found):
-            return int(found[0])
-        own, values = self.stack.number, self._of(system, key)
-        self.stack, k = with_free_place(self.stack, own, lambda size: self._empty(system, size), own)
+        matches = np.flatnonzero((self.stack.number > 0) & self._same(self.stack, system, key))
+        if len(matches):
+            return int(matches[0])
+        numbers, values = self.stack.number, self._of(system, key)
+        self.stack, k = with_free_place(self.stack, numbers, lambda size: self._empty(system, size), numbers)
         for name, value in values.items():
             getattr(self.stack, name)[(k, *map(slice, np.shape(value)))] = value
         self.stack.number[k] = next(_NUMBERS)
@@ -99,19 +99,19 @@ def known_of(system: Any, deciding: Iterable[str], make: Callable[[Any], Known])
 
     deciding: names of the parts of the system that decide its subsystems.
     """
-    key, kept = (make, *(np.asarray(getattr(system, name)).tobytes() for name in deciding)), _STRUCTURES.known
-    kept[key] = kept.pop(key) if key in kept else make(system)
-    while len(kept) > _KEPT:
-        kept.popitem(last=False)
-    return kept[key]
+    key, store = (make, *(np.asarray(getattr(system, name)).tobytes() for name in deciding)), _STRUCTURES.known
+    store[key] = store.pop(key) if key in store else make(system)
+    while len(store) > _KEPT:
+        store.popitem(last=False)
+    return store[key]
 
 
 @kernel
 def add_known(same, fill, system, subsystems, key, flows, scratch):
-    """Fill the flow of a key, closed rows or states, at a place that has been its own before or is new.
+    """Fill the flow of a key, closed rows or states, at its index, old or new.
 
     same: whether a subsystem is the key's; fill: sets a flow. Returns DONE, ILL_CONDITIONED where doubles do not
-    resolve it, NEEDS_FLOW for a subsystem that is new, or no place.
+    resolve it, NEEDS_FLOW for a new subsystem, or no index.
     """
     for k in range(len(subsystems.number)):
         if not (subsystems.number[k] > 0 and same(system, subsystems, k, key)):
@@ -130,7 +130,7 @@ def add_known(same, fill, system, subsystems, key, flows, scratch):
 
 
 def with_place(flows: Any, known: Known, k: int, empty: Callable[[int], Any]) -> Any:
-    """Return flows with a place for subsystem k, which compiled code fills: its own, a free one, or the oldest's."""
+    """Return flows with an index for subsystem k, which compiled code fills: its own, a free one, or the oldest."""
     if not np.any(flows.subsystem == known.stack.number[k]):
         flows, s = with_free_place(flows, flows.subsystem, empty, flows.used)
         flows.subsystem[s] = flows.modes[s] = 0

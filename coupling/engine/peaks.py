@@ -76,9 +76,9 @@ def _ends(response, eigenvalue, amplitude, gain, waves, count):
         rate, wave = eigenvalue[j], response[j] * amplitude[j]
         waves[j] = wave
         square = rate.real * rate.real + rate.imag * rate.imag
-        part = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
-        fourth += part * (square * square)
-        size += part
+        modulus = math.sqrt(wave.real * wave.real + wave.imag * wave.imag)
+        fourth += modulus * (square * square)
+        size += modulus
         x0 += wave.real
         v0 += rate.real * wave.real - rate.imag * wave.imag
         wave += response[j] * gain[j]
@@ -187,18 +187,18 @@ def _extremum(rates, waves, driven, drives, constant, x0, v0, x1, v1, h):
             for j in range(driven[k], driven[k + 1]):
                 rate = rates[j]
                 growth, _ = secular(rate, excitation, t)
-                part, turn = drives[j] * growth, drives[j] * (1.0 + exp_minus_one(excitation * t))
-                x += part.real
-                part, turn = rate * part + turn, excitation * turn
-                v += part.real
-                part, turn = rate * part + turn, excitation * turn
-                w += part.real
-                part, turn = rate * part + turn, excitation * turn
-                third += part.real
-                part, turn = rate * part + turn, excitation * turn
-                fourth += part.real
-                part = rate * part + turn
-                fifth += part.real
+                term, turn = drives[j] * growth, drives[j] * (1.0 + exp_minus_one(excitation * t))
+                x += term.real
+                term, turn = rate * term + turn, excitation * turn
+                v += term.real
+                term, turn = rate * term + turn, excitation * turn
+                w += term.real
+                term, turn = rate * term + turn, excitation * turn
+                third += term.real
+                term, turn = rate * term + turn, excitation * turn
+                fourth += term.real
+                term = rate * term + turn
+                fifth += term.real
                 sixth += secular_bound(drives[j], rate, excitation, 2.0 * math.pi / rates[0].imag, 6)
         if v * v0 > 0.0:
             lo = t
@@ -229,13 +229,13 @@ def _derivatives(rates, waves, constant, t):
     x, v, w, third, fourth, fifth, sixth = constant, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(rates)):
         rate, wave = rates[j], waves[j]
-        part = wave + wave * exp_minus_one(rate * t)
+        term = wave + wave * exp_minus_one(rate * t)
         twice, square = 2.0 * rate.real, rate.real * rate.real + rate.imag * rate.imag
-        d0, d1 = part.real, rate.real * part.real - rate.imag * part.imag
+        d0, d1 = term.real, rate.real * term.real - rate.imag * term.imag
         d2 = twice * d1 - square * d0
         d3 = twice * d2 - square * d1
         d4 = twice * d3 - square * d2
         x, v, w, third, fourth = x + d0, v + d1, w + d2, third + d3, fourth + d4
         fifth += twice * d4 - square * d3
-        sixth += (abs(part.real) + abs(part.imag)) * (square * square * square)
+        sixth += (abs(term.real) + abs(term.imag)) * (square * square * square)
     return x, v, w, third, fourth, fifth, sixth

@@ -1,7 +1,7 @@
 """Guaranteed search for the first root of an event function.
 
 Event functions are  k0 + k1 t + k2 t^2/2 + Re sum_j g_j E(lambda_j t)  with Re lambda_j <= 0, and positive until the
-event. Two that differ by the sign of their motion, as the gaps on both sides of a body, share its expansion. With the
+event. Two that differ by the sign of their motion, as the gaps on both sides of a body, have one expansion. With the
 exponentials at a point come all derivatives there, and bounds of the derivatives at all later times: the sums of
 |g_j exp(lambda_j t)| |lambda_j|^p. The function stays above its Taylor polynomial less the bound of its remainder: a
 step that ends before the first root of this lower polynomial provably holds no root. Steps are as long as a few radians
@@ -41,7 +41,7 @@ MOST, ENDLESS = 1_000_000, -3
 DEGREE = 10
 _OVER_FACTORIAL = tuple(1.0 / math.factorial(p) for p in range(DEGREE + 1))
 
-# places in the sums over modes: derivatives up to the bound of order DEGREE, a bound of the second, sizes
+# entries of the sums over modes: derivatives up to the bound of order DEGREE, a bound of the second, sizes
 _SECOND, _SIZE, _SUMS = DEGREE + 1, DEGREE + 2, DEGREE + 3
 
 # a step that long, in units of (second bound / last bound)^(1 / (DEGREE - 2)), leaves out a few thousandths
@@ -83,12 +83,12 @@ def add_secular(order, drive, driven, eigenvalue, t, period, taylor):
             growth, beyond = secular(rate, excitation, t)
             # derivatives by D' = lambda D + exp(i omega t)
             now, turn = d * growth, d * (1.0 + first)
-            part, slope = now, rate * now + turn
+            height, slope = now, rate * now + turn
             if order == POSITION:
-                part, slope = d * beyond, rate * now + d * first
-            noise += abs(part.real) + abs(part.imag) + abs(now.real) + abs(now.imag)
+                height, slope = d * beyond, rate * now + d * first
+            noise += abs(height.real) + abs(height.imag) + abs(now.real) + abs(now.imag)
             for polynomial in (whole, slow):
-                polynomial[0] += part.real
+                polynomial[0] += height.real
                 polynomial[1] += slope.real
             now = rate * now + turn
             for p in range(2, DEGREE):
@@ -127,7 +127,7 @@ def expand(order, k1, k2, g, eigenvalue, harmonics, count, t, work):
     are as well bounded, but steps may be shorter. What g holds of other modes is lost.
     Returns the round-off of the value, a bound of the second derivative, that of the slow modes (-1: all are), and the
     size of the fast modes.
-    order POSITION: exponentials as exp(z) - 1 - z, so that there is no motion at the start, and its rate is k1 exactly;
+    order POSITION: exponentials as exp(z) - 1 - z, so there is no motion at the start, and its rate is k1 exactly;
     VELOCITY: exp(z) - 1 with the constant slope k1; FORCE: exp(z) only.
     """
     value, noise, slope, amplitude = 0.0, 0.0, 0.0, g
@@ -216,9 +216,9 @@ def _later(term, g, eigenvalue, count, t, amplitude):
         rate, start = eigenvalue[j], g[j]
         z = complex(rate.real * t, rate.imag * t)
         first = exp_minus_one(z)
-        change, part = start * first, start * term(z, first)
-        value += part.real
-        size += abs(part.real) + abs(part.imag)
+        change, added = start * first, start * term(z, first)
+        value += added.real
+        size += abs(added.real) + abs(added.imag)
         slope += rate.real * change.real - rate.imag * change.imag
         amplitude[j] = start + change
     return value, size, slope
@@ -244,9 +244,9 @@ def _add_up(amplitude, eigenvalue, low, high, sums):
         d9 = twice * d8 - square * d7
         c0, c1, c2, c3, c4 = c0 + d0, c1 + d1, c2 + d2, c3 + d3, c4 + d4
         c5, c6, c7, c8, c9 = c5 + d5, c6 + d6, c7 + d7, c8 + d8, c9 + d9
-        part = _size(one)
+        modulus = _size(one)
         fourth = square * square
-        size, second, last = size + part, second + part * square, last + part * (square * (fourth * fourth))
+        size, second, last = size + modulus, second + modulus * square, last + modulus * (square * (fourth * fourth))
     sums[0], sums[1], sums[2], sums[3], sums[4], sums[5] = c0, c1, c2, c3, c4, c5
     sums[6], sums[7], sums[8], sums[9], sums[DEGREE] = c6, c7, c8, c9, last
     sums[_SECOND], sums[_SIZE] = second, size
@@ -348,10 +348,10 @@ def step_or_stop(expansion, sign, k0, k0_far, noise, second, calm, fast, longest
             far, _, _ = safe_step(slow, sign, above, 0.0, 0.0, calm, longest)
             if far >= longest:
                 return far, False, False
-    step, found, clear = safe_step(whole, sign, f, max(k0_far - sign * whole[0], 0.0), noise, second, longest)
+    step, is_root, clear = safe_step(whole, sign, f, max(k0_far - sign * whole[0], 0.0), noise, second, longest)
     if far > step:
         return far, False, False
-    if calm >= 0.0 and far == 0.0 and not found and shortest < step < longest:
+    if calm >= 0.0 and far == 0.0 and not is_root and shortest < step < longest:
         # the slow motion has left the fast one behind by then
         above = k0 + sign * slow[0] - fast + shift(slow, sign, step, expansion.shifted)
         if above > noise:
@@ -360,7 +360,7 @@ def step_or_stop(expansion, sign, k0, k0_far, noise, second, calm, fast, longest
     if step < shortest:
         falls = slope < 0.0 and f <= 2.0 * shortest * (second * shortest - slope)
         return (0.0, True, False) if falls else (shortest, False, False)
-    return step, found, clear
+    return step, is_root, clear
 
 
 @kernel

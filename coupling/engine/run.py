@@ -1,4 +1,4 @@
-"""What runs of both engines have in common: slices of compiled code, and subsystems that are added as they are met."""
+"""Common to runs of both engines: slices of compiled code, and subsystems that are added as they are met."""
 
 from __future__ import annotations
 
@@ -11,7 +11,17 @@ import numpy as np
 
 from vanedamp.coupling.engine.columns import STARTS, Columns, repeated
 from vanedamp.coupling.engine.known import IllConditioned, Known, with_place
-from vanedamp.coupling.engine.scenes import CODE, COURSE_ROOM, LEAVES, PLACE, RUNS, STAGE, UNJUDGED, Job, new_job
+from vanedamp.coupling.engine.scenes import (
+    CODE,
+    COURSE_ROOM,
+    LEAVES,
+    PLACE,
+    RUNS,
+    STAGE,
+    UNJUDGED,
+    BatchArrays,
+    new_job,
+)
 from vanedamp.coupling.engine.trace import COURSE, UNTRACED, Trace, clear, new_trace, turned
 from vanedamp.coupling.numerics.codes import (
     DONE,
@@ -34,7 +44,7 @@ from vanedamp.coupling.response.plane import Plane
 from vanedamp.coupling.response.records import IMPACT_LOSS, Records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.response.segment import START, Begun, Event, Segment
+from vanedamp.coupling.response.segment import START, Begun, Segment, SegmentEnd
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 from vanedamp.files.store import frozen
@@ -50,7 +60,7 @@ class EventDrivenRun(ABC):
 
     #: counters that the outcome has
     NUMBERS: ClassVar = {"impacts": IMPACTS, "segments": SEGMENTS, "evaluations": EVALUATIONS}
-    #: returns what the rows of the log are (event_log.Rows), from the system
+    #: returns the rows of the log (event_log.Rows), from the system
     rows_of: ClassVar[Any]
     #: the compiled function, and whether a scene is so common that it is compiled for its lengths
     compiled: ClassVar[Any]
@@ -58,7 +68,7 @@ class EventDrivenRun(ABC):
     #: make, for a system: known subsystems, room for flows (and some number of them), room to fill these; and with a
     #: number of modes state, event functions and scratch space
     rooms: ClassVar[tuple[Callable[..., Any], ...]]
-    #: name of what names a subsystem in the state
+    #: name of the subsystem's key in the state
     key: ClassVar[str]
     #: those compiled for lengths, by engine
     _sized: ClassVar[dict[type, Any]] = {}
@@ -90,7 +100,7 @@ class EventDrivenRun(ABC):
             self._run = self._sized[type(self)]
 
     def begin_from(self, start: RestartState) -> None:
-        """Let the run begin, or begin again, from a start: what it has recorded is lost."""
+        """Begin, or begin again, from a start; records are lost."""
         self.chunks: list[np.ndarray] = []
         self.begun, self.ended, self._since = False, False, START
         self.listed = 0  # entries of the log, kept or not
@@ -100,7 +110,7 @@ class EventDrivenRun(ABC):
     def columns_of(
         self, scene: Scene, start: RestartState, values: Mapping[str, np.ndarray]
     ) -> tuple[Columns, Iterable[int]]:
-        """Return columns of scenes by some numbers (k,), by path, and places of those that compiled code cannot run.
+        """Return columns of scenes by some numbers (k,), by path, and indices of those that compiled code cannot run.
 
         start: of the scene.
         """
@@ -130,12 +140,12 @@ class EventDrivenRun(ABC):
         return int(self._run(*self._records(), periods, max_events))
 
     def _add_flow(self) -> None:
-        """Find the subsystem that the state calls for, and a place for it. Raises IllConditioned, LinAlgError."""
+        """Find the state's subsystem, and an index for it. Raises IllConditioned, LinAlgError."""
         k = self.known.place(self.system, getattr(self.state, self.key))
         self.flows = with_place(self.flows, self.known, k, partial(self._empty_flows, self.system))
 
-    def run_many(self, job: Job, columns: Columns, statistics: tuple[Any, ...]) -> int:
-        """Go on with the scenes of a job. Return the code DONE, or OUTSIDE for one that it cannot run.
+    def run_many(self, job: BatchArrays, columns: Columns, statistics: tuple[Any, ...]) -> int:
+        """Continue the scenes of a job. Return the code DONE, or OUTSIDE for one that it cannot run.
 
         columns: with a row more than scenes where these are linked; statistics: Setup, LinearParts and LinearModes of
         the loose and the held system, Measured.
@@ -146,7 +156,7 @@ class EventDrivenRun(ABC):
         return code
 
     def start_in(self, k: int, left: int) -> RestartState:
-        """Return the start of scene k in the columns, in the cavities of the scene, by its place, that has left it."""
+        """Return the start of scene k in the columns, in the cavities of the scene, by index, that has left it."""
         parts = {name: frozen(getattr(self.columns, name)[k]) for name in STARTS}
         behind = self.columns.play.shape[1] - (len(self.whole.rest) if self.whole.in_plane else self.whole.contacts)
         return RestartState(**parts, gap=frozen(self.columns.play[left, behind:][: self.whole.contacts]))
@@ -163,7 +173,7 @@ class EventDrivenRun(ABC):
         """Return the motion from the present state on."""
 
     @abstractmethod
-    def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, Event]:
+    def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, SegmentEnd]:
         """Return the last event and the time since the segment began, s. log: entries since then."""
 
     @property
@@ -197,7 +207,7 @@ class EventDrivenRun(ABC):
         self.counters[LOGGED] = 0
 
     def _empty_course(self) -> None:
-        """Let the reader take what it can of the course; where too little is free then, there is to be more room."""
+        """Let the reader take of the course; where too little is free then, make room."""
         course, noted = self.records.course, self.records.noted
         left = course[self.reader(course[: noted[0]]) : noted[0]].copy()
         if len(left) + COURSE_ROOM > len(course):
@@ -241,7 +251,7 @@ class EventDrivenRun(ABC):
         self._since = Begun(float(st.time[0]), len(self.chunks), loss, reduced)
         return self._segment()
 
-    def event(self) -> tuple[float, Event]:
+    def event(self) -> tuple[float, SegmentEnd]:
         """Return the last event and the time since the last `segment`, s."""
         return self._event(self.chunks[self._since.chunks :], self._since)
 
@@ -251,10 +261,10 @@ class EventDrivenRun(ABC):
 
     def outcome(self) -> Outcome:
         """Return the results of the run."""
-        found = {name: int(self.counters[place]) for name, place in self.NUMBERS.items()}
-        found |= {"changes": int(self.counters[EVENTS]), "subsystems": int(np.count_nonzero(self.flows.modes))}
+        numbers = {name: int(self.counters[index]) for name, index in self.NUMBERS.items()}
+        numbers |= {"changes": int(self.counters[EVENTS]), "subsystems": int(np.count_nonzero(self.flows.modes))}
         return Outcome(
-            self.whole, self.records, int(self.counters[PERIOD]), self.listed, OPEN_LEDGER, found, self.chunks,
+            self.whole, self.records, int(self.counters[PERIOD]), self.listed, OPEN_LEDGER, numbers, self.chunks,
             self._rows_of_log, plane=self._plane(),
         )  # fmt: skip
 
@@ -264,5 +274,5 @@ class EventDrivenRun(ABC):
         return rows
 
     def _plane(self) -> Plane | None:
-        """Return what bodies in the plane add to the outcome."""
+        """Return the planar bodies' part of the outcome."""
         return None

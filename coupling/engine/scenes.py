@@ -1,6 +1,6 @@
-"""Runs in one compiled call: of one scene, or of many that differ in numbers, one after the other.
+"""Runs in one compiled call: of one scene, or of many that differ in numbers, in turn.
 
-A scene begins with its start (engine.columns), and its motion goes on until a number of periods. A linear subsystem
+A scene begins with its start (engine.columns), and its motion continues until a number of periods. A linear subsystem
 that its structure has met before is filled here: only a new one needs Python. Of many scenes each is judged and
 measured here too, by the functions that do so after a single run (response.steadiness, response.figures).
 """
@@ -27,48 +27,48 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.compiler.jit import kernel
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.quantities.sums import SUMS
-from vanedamp.coupling.response.figures import Measured, measure
+from vanedamp.coupling.response.figures import FigureInputs, measure
 from vanedamp.coupling.response.records import MOST_PIECES
 from vanedamp.coupling.response.steadiness import LOOK, judged, known_after, run_ends
 from vanedamp.coupling.system.linear_modes import LinearModes, LinearParts
-from vanedamp.coupling.system.transient import Setup, begin_transient, run_length
+from vanedamp.coupling.system.transient import TransientInputs, begin_transient, run_length
 
 #: segments after which an engine returns, so that Python empties the log and sees interrupts; after which a job does
 SLICE, _SEGMENTS = 4096, 8 * 4096
 #: rows that the course of a run takes at most until its engine returns
 COURSE_ROOM = 2 * (SLICE + 1) + MOST_PIECES
 
-# numbers of a job: scenes, 0 for one that the caller judges; the present one; what comes next with it; its periods,
+# numbers of a job: scenes, 0 for one that the caller judges; the present one; its next step; its periods,
 # those left out and the longest run; the code that ends it; segments since Python has seen it; with which states
 # scenes begin; the number of the last scene that has left one for the next, from 1, 0: none; whether Python keeps the
 # log
 COUNT, PLACE, STAGE, GOAL, DROPPED, MOST, CODE, SEGMENTS, LINKED, LEFT, LOGS = range(11)
-#: what comes next with a scene: it begins, goes on, or leaves its state in its columns
+#: the next step of a scene: it begins, continues, or leaves its state in its columns
 BEGINS, RUNS, LEAVES = range(3)
 #: scenes begin with their own states, each with what the one before has left, or with states of other runs that fit
 OWN, LINKS, GIVEN = range(3)
-#: of bodies in the plane: largest tilt, rad, time off the floor, s, impacts on walls, what a tilt neglects (System)
+#: of planar bodies: largest tilt, rad, time off the floor, s, impacts on walls, what a tilt neglects (System)
 TILT, LIFTED, WALLS, NEGLECTED = range(4)
 
 
 @record_with(free_axes=3)
-class Job(NamedTuple):
-    """What is asked of a call, and the results of k scenes."""
+class BatchArrays(NamedTuple):
+    """Input of a call, and results of k scenes."""
 
     at: Annotated[np.ndarray, "numbers", int]
     codes: Annotated[np.ndarray, "k", int]  # of numerics.codes; 0: the scene has not run, OUTSIDE: it is not to
     kinds: Annotated[np.ndarray, "k", int]  # classes of motion (response.figures)
     sums: Annotated[np.ndarray, "k sums"]
     peaks: Annotated[np.ndarray, "periods"]  # room to judge a run
-    plane: Annotated[np.ndarray, "4 k b"]  # of bodies in the plane: TILT, LIFTED, WALLS, NEGLECTED
+    plane: Annotated[np.ndarray, "4 k b"]  # of planar bodies: TILT, LIFTED, WALLS, NEGLECTED
 
 
-def new_job(scenes: int = 0, periods: int = 0, linked: int = OWN, logs: bool = False, bodies: int = 0) -> Job:
+def new_job(scenes: int = 0, periods: int = 0, linked: int = OWN, logs: bool = False, bodies: int = 0) -> BatchArrays:
     """Return the job of many scenes, of at most so many periods; or of one run that the caller judges.
 
     bodies: of the plane, whose results are to be kept.
     """
-    job = room(Job, {"numbers": 11, "k": scenes, "sums": len(SUMS), "periods": periods, "b": bodies})
+    job = room(BatchArrays, {"numbers": 11, "k": scenes, "sums": len(SUMS), "periods": periods, "b": bodies})
     job.at[COUNT], job.at[LINKED], job.at[LOGS] = scenes, linked, logs
     return job
 
@@ -76,17 +76,17 @@ def new_job(scenes: int = 0, periods: int = 0, linked: int = OWN, logs: bool = F
 #: records of runs that the caller judges
 UNJUDGED = tuple(
     room(kind, dict.fromkeys("bceknmNsu", 0))
-    for kind in (Setup, LinearParts, LinearParts, LinearModes, LinearModes, Measured)
+    for kind in (TransientInputs, LinearParts, LinearParts, LinearModes, LinearModes, FigureInputs)
 )
 
 
-#: a call is to go on with a job
+#: a call is to continue a job
 ON = np.int64(0)
 
 
 @kernel
 def take_scene(take, job, columns, base, flows, setup, measured):
-    """Set what differs between scenes to the numbers of one that begins, by `take`. Returns False if all have run."""
+    """Set the scenes' differences to the numbers of one that begins, by `take`. Returns False if all have run."""
     at = job.at
     if at[COUNT] > 0 and at[PLACE] < at[COUNT] and at[STAGE] == BEGINS:
         take(columns, base, flows, setup, measured, at[PLACE], at[LINKED])
@@ -98,7 +98,7 @@ def run_scene(
     begin, advance, fill_known, start, is_outside, leave, note_segment, note_event, job, columns, system, subsystems,
     flows, st, watched, rec, scratch, assembly, setup, loose, held, free, stuck, measured, trace, goal, max_events,
 ):  # fmt: skip
-    """Go on with the present scene by the functions of its engine; `goal` periods of one that the caller judges.
+    """Continue the present scene by the functions of its engine; `goal` periods of one that the caller judges.
 
     Returns why Python is to go on (numerics.codes), or ON where this is to be called again.
     """
@@ -166,7 +166,7 @@ def run_scene(
 
 @kernel
 def take_numbers(columns, base, flows, setup, measured, k, linked, same, first):
-    """Set what differs between scenes to the numbers of scene k; flows of other forces are to be filled again.
+    """Set the scenes' differences to the numbers of scene k; flows of other forces are to be filled again.
 
     first: row of the first contact, which is the first unit; same: whether an engine's own numbers that enter flows
     are those that were.
@@ -197,12 +197,12 @@ def take_numbers(columns, base, flows, setup, measured, k, linked, same, first):
 @kernel
 def repeat(columns, k):
     """Let the scene after scene k begin as that."""
-    for part in (
+    for array in (
         columns.displacement, columns.velocity, columns.slip, columns.slip_velocity, columns.elongation, columns.lift,
         columns.lift_velocity, columns.tilt, columns.tilt_rate,
     ):  # fmt: skip
-        for i in range(part.shape[1]):
-            part[k + 1, i] = part[k, i]
+        for i in range(array.shape[1]):
+            array[k + 1, i] = array[k, i]
 
 
 @kernel
@@ -233,12 +233,12 @@ def _end(job, setup, free, stuck, measured, rec, done, code):
 
 
 @kernel
-def copy(own, other):
+def copy(target, other):
     """Set numbers to others. Returns whether they were the same."""
     same = True
-    for i in range(len(own)):
-        same = same and own[i] == other[i]
-        own[i] = other[i]
+    for i in range(len(target)):
+        same = same and target[i] == other[i]
+        target[i] = other[i]
     return same
 
 

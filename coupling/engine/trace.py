@@ -1,6 +1,6 @@
 """The course of a run, written down in compiled code: segments, and the events between them.
 
-Event i stands before segment i, event 0 before time zero. A run whose course is full stops, and goes on once what has
+Event i stands before segment i, event 0 before time zero. A run whose course is full stops, and continues once what has
 been read is given away (`turned`).
 """
 
@@ -24,14 +24,14 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.response.records import IMPACT_LOSS
-from vanedamp.coupling.response.segment import Event
+from vanedamp.coupling.response.segment import SegmentEnd
 from vanedamp.coupling.system.system import System
 
 #: segments that are kept at once
 COURSE = 256
 
 # numbers of a course: segments, and contacts struck in the events so far; whether the present segment has begun, or is
-# written down; whether the start is; what the present call goes on to, and whether it has gone; reduced impacts as the
+# written down; whether the start is; the goal of the present call, and whether it has gone; reduced impacts as the
 # segment began
 COUNT, STRUCK, READY, STARTED, GOAL, BUDGET, CALLED, SINCE = range(8)
 _NO, _BEGUN, _NOTED = range(3)
@@ -39,7 +39,7 @@ _NO, _BEGUN, _NOTED = range(3)
 
 @record_with(free_axes=2)
 class Trace(NamedTuple):
-    """Segments (s) and events (m = s + 1) of a run, as in response.segment; contacts struck (h) one after the other."""
+    """Segments (s) and events (m = s + 1) of a run, as in response.segment; contacts struck (h) in turn."""
 
     at: Annotated[np.ndarray, "numbers", int]
     since: Annotated[np.ndarray, "2"]  # time and energy lost in impacts as the present segment began
@@ -96,7 +96,7 @@ class Leg(NamedTuple):
     q: np.ndarray
     v: np.ndarray
     open_force: np.ndarray
-    event: Event
+    event: SegmentEnd
 
     @property
     def start(self) -> float:
@@ -107,31 +107,31 @@ class Leg(NamedTuple):
 def leg_of(trace: Trace, i: int, length: float) -> Leg:
     """Return segment i. length: of a period, s."""
     e, struck = i + 1, slice(int(trace.first[i + 1]), int(trace.first[i + 2]))
-    event = Event(
+    event = SegmentEnd(
         int(trace.unit[e]), int(trace.what[e]), trace.impulse[e].copy(), trace.compression[e].copy(),
         trace.struck[struck].copy(), trace.before[struck].copy(), trace.after[struck].copy(), float(trace.loss[e]),
         bool(trace.reduced[e]),
     )  # fmt: skip
-    state, q, v, open_force = (part[i].copy() for part in (trace.state, trace.q, trace.v, trace.open_force))
+    state, q, v, open_force = (array[i].copy() for array in (trace.state, trace.q, trace.v, trace.open_force))
     time, duration, speed = float(trace.time[i]), float(trace.duration[i]), float(trace.speed[i])
     return Leg(length, int(trace.period[i]), time, duration, speed, state, q, v, open_force, event)
 
 
 def turned(trace: Trace) -> None:
-    """Give away what has been read: all but the last segment and the events beside it, which are the first now."""
+    """Drop what has been read: all but the last segment and its events, now the first."""
     at, last = trace.at, int(trace.at[COUNT]) - 1
-    first, kept = int(trace.first[last]), int(trace.first[last + 2])
+    first, end = int(trace.first[last]), int(trace.first[last + 2])
     for name in ("period", "time", "duration", "speed", "state", "q", "v", "open_force"):
-        part = getattr(trace, name)
-        part[0] = part[last]
+        array = getattr(trace, name)
+        array[0] = array[last]
     for name in ("unit", "what", "impulse", "compression", "loss", "reduced"):
-        part = getattr(trace, name)
-        part[:2] = part[last : last + 2].copy()
+        array = getattr(trace, name)
+        array[:2] = array[last : last + 2].copy()
     for name in ("struck", "before", "after"):
-        part = getattr(trace, name)
-        part[: kept - first] = part[first:kept].copy()
+        array = getattr(trace, name)
+        array[: end - first] = array[first:end].copy()
     trace.first[:3] = trace.first[last : last + 3] - first
-    at[COUNT], at[STRUCK] = 1, kept - first
+    at[COUNT], at[STRUCK] = 1, end - first
 
 
 @kernel
@@ -151,7 +151,7 @@ def next_leg(note_segment, system, flows, st, watched, scratch, trace):
 
 @kernel
 def noted(note_event, system, st, watched, rec, scratch, trace, code, goal, max_events, on):
-    """Write down what a run has come to with a code. Returns why it is to return, or `on`."""
+    """Write down a run's code. Returns why it is to return, or `on`."""
     at, counters = trace.at, st.counters
     if code == NEEDS_FLOW:
         return code

@@ -1,1 +1,1 @@
-"""Ensembles: a scene whose numbers are ranges, run for samples of them; quantiles, and what the spread is due to."""
+"""Ensembles: a scene whose numbers are ranges, run for samples of them; quantiles, and causes of the spread."""

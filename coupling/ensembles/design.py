@@ -1,4 +1,4 @@
-"""Samples of numbers within their ranges, quantiles of what comes of them, and Sobol' indices, by SALib.
+"""Samples of numbers within their ranges, quantiles of their results, and Sobol' indices, by SALib.
 
 The design is Saltelli's on a scrambled Sobol' sequence of N points: N blocks of d + 2 samples (A, each number of A
 taken from B in turn, B). SALib's estimators are those of Saltelli et al., Computer Physics Communications 181 (2010)
@@ -29,8 +29,8 @@ def design(ranges: Mapping[str, tuple[float, float]], table: EnsembleTable) -> n
 
     logarithmic = table.distribution == "log-uniform"
     bounds = np.log(list(ranges.values())) if logarithmic else np.array(list(ranges.values()))
-    found = sobol.sample(_problem(bounds), table.samples, calc_second_order=False, seed=table.seed)
-    return np.clip(np.exp(found) if logarithmic else found, *np.transpose(list(ranges.values())))
+    sample = sobol.sample(_problem(bounds), table.samples, calc_second_order=False, seed=table.seed)
+    return np.clip(np.exp(sample) if logarithmic else sample, *np.transpose(list(ranges.values())))
 
 
 def independent(values: np.ndarray, numbers: int) -> np.ndarray:
@@ -41,11 +41,11 @@ def independent(values: np.ndarray, numbers: int) -> np.ndarray:
 
 def quantiles(values: np.ndarray, numbers: int) -> np.ndarray:
     """Return QUANTILES (5, ...) of results (N (d + 2), ...) over the independent samples; nan ones are left out."""
-    own = independent(values, numbers)
-    found = np.full((len(QUANTILES), *own.shape[1:]), np.nan)
-    known = np.isfinite(own).any(axis=0)
-    found[:, known] = np.nanquantile(own[:, known], QUANTILES, axis=0)
-    return found
+    draws = independent(values, numbers)
+    result = np.full((len(QUANTILES), *draws.shape[1:]), np.nan)
+    known = np.isfinite(draws).any(axis=0)
+    result[:, known] = np.nanquantile(draws[:, known], QUANTILES, axis=0)
+    return result
 
 
 def indices(values: np.ndarray, numbers: int, seed: int) -> np.ndarray:
@@ -62,15 +62,15 @@ def _indices(blocks: np.ndarray, numbers: int, seed: int) -> np.ndarray:
     from SALib.analyze import sobol
 
     blocks = blocks[np.isfinite(blocks).all(axis=1)]
-    own = blocks[:, [0, -1]]  # A and B, whose variance is shared out
-    if len(blocks) < _LEAST or np.ptp(own) <= _CONSTANT * np.abs(own).max():
+    base = blocks[:, [0, -1]]  # A and B, whose variance is shared out
+    if len(blocks) < _LEAST or np.ptp(base) <= _CONSTANT * np.abs(base).max():
         return np.full((len(INDICES), numbers), np.nan)
     problem = _problem(np.tile([0.0, 1.0], (numbers, 1)))
-    with warnings.catch_warnings():  # of blocks drawn again that are all alike, whose indices count as zero
+    with warnings.catch_warnings():  # of equal resampled blocks, whose indices count as zero
         warnings.simplefilter("ignore")
         # SALib takes the seed 0 as none
-        found = sobol.analyze(problem, blocks.ravel(), calc_second_order=False, seed=seed + 1)
-    return np.array([found[name] for name in ("S1", "S1_conf", "ST", "ST_conf")])
+        analysis = sobol.analyze(problem, blocks.ravel(), calc_second_order=False, seed=seed + 1)
+    return np.array([analysis[name] for name in ("S1", "S1_conf", "ST", "ST_conf")])
 
 
 def _problem(bounds: np.ndarray) -> dict[str, Any]:

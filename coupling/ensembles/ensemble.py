@@ -11,7 +11,7 @@ import numpy as np
 
 from vanedamp.coupling.ensembles.design import indices, quantiles
 from vanedamp.coupling.ensembles.members import Members, members
-from vanedamp.coupling.ensembles.record import PEAK, REDUCTION, Ensemble, complete, kept
+from vanedamp.coupling.ensembles.record import PEAK, REDUCTION, Ensemble, complete, of_samples
 from vanedamp.coupling.quantities.amplitude import amplitude_mean_dynamic, amplitude_undamped
 from vanedamp.coupling.quantities.linear_peaks import undamped_peak
 from vanedamp.coupling.quantities.quantity import table
@@ -41,26 +41,28 @@ def ensemble(
 
 def _record(points: Members, finished: SweepTable, provenance: dict[str, Any]) -> Ensemble:
     shape, grid = (points.count, *points.grid.shape), points.grid
-    arrays = {name: values for name, values in finished.arrays(shape).items() if name in kept()}
-    found = {name: _worst(values, len(table()[name].dims)) for name, values in arrays.items()}
-    found = {name: values for name, values in found.items() if not table()[name].dims or np.isfinite(values).any()}
+    arrays = {name: values for name, values in finished.arrays(shape).items() if name in of_samples()}
+    by_member = {name: _worst(values, len(table()[name].dims)) for name, values in arrays.items()}
+    by_member = {
+        name: values for name, values in by_member.items() if not table()[name].dims or np.isfinite(values).any()
+    }
     status = finished.text("status").reshape(shape)
     ok = status == "ok"
-    results = {name: np.where(ok, found[name], np.nan) for name in found if table()[name].spread}
+    results = {name: np.where(ok, by_member[name], np.nan) for name in by_member if table()[name].spread}
     of_curves = _of_curves(points, results)
     # indices of all results at every point of a grid would take far longer than the runs
     mean = amplitude_mean_dynamic.name
-    told = {mean: results[mean]} if grid.axes else results
+    analysed = {mean: results[mean]} if grid.axes else results
     count, seed = len(points.samples), points.scene.sampled.seed
     return Ensemble(
         scene=points.scene,
         axes=of_axes(grid.axes),
         samples=points.samples,
-        members=found,
+        members=by_member,
         status=frozen(status, object),
         quantile={name: frozen(quantiles(values, count)) for name, values in (results | of_curves).items()},
-        indices={name: frozen(indices(values, count, seed)) for name, values in (told | of_curves).items()},
-        provenance=provenance | notes_on(grid, found),
+        indices={name: frozen(indices(values, count, seed)) for name, values in (analysed | of_curves).items()},
+        provenance=provenance | notes_on(grid, by_member),
     )
 
 

@@ -1,4 +1,4 @@
-"""The points of an ensemble: those of a sweep's grid for every sample of the numbers that are ranges."""
+"""The points of an ensemble: a sweep's grid for every sample of the ranges."""
 
 from __future__ import annotations
 
@@ -50,19 +50,19 @@ class Members:
         return self.count * self.grid.size
 
     def values(self, index: int) -> dict[str, Any]:
-        """Return what a point changes in the base, by paths."""
-        sample, place = divmod(index, self.grid.size)
-        return self.grid.values(place) | self.sample(sample)
+        """Return a point's changes of the base, by paths."""
+        sample, point = divmod(index, self.grid.size)
+        return self.grid.values(point) | self.sample(sample)
 
     def sample(self, number: int) -> dict[str, float]:
         """Return the values of a sample by their paths."""
         return {path: float(values[number]) for path, values in self.samples.items()}
 
     def table(self, points: Sequence[int]) -> PointTable:
-        """Return what some points change in the base."""
-        sample, place = np.divmod(np.asarray(points, np.int64), self.grid.size)
-        own = {path: values[sample].tolist() for path, values in self.samples.items()}
-        return PointTable(self.grid.table(place.tolist()).columns | own)
+        """Return some points' changes of the base."""
+        sample, point = np.divmod(np.asarray(points, np.int64), self.grid.size)
+        drawn = {path: values[sample].tolist() for path, values in self.samples.items()}
+        return PointTable(self.grid.table(point.tolist()).columns | drawn)
 
     def chains(self) -> Iterator[Chain]:
         """Yield all points, in chains that can run side by side."""
@@ -77,14 +77,14 @@ class Members:
         """Return the peaks (s, ...) of the linear curves of every sample, as `linear_tops` does of a grid's."""
         felt = [path for path in self.samples if not UNFELT.fullmatch(path)]
         points, known = Points(self.grid.base), dict[tuple[float, ...], dict[str, np.ndarray]]()
-        found = []
+        tops = []
         for number in range(self.count):
             sample = self.sample(number)
             key = tuple(sample[path] for path in felt)
             if key not in known:
                 known[key] = linear_tops(replace(self.grid, base=points.raw(sample)))
-            found.append(known[key])
-        return {name: frozen([each[name] for each in found]) for name in found[0]}
+            tops.append(known[key])
+        return {name: frozen([each[name] for each in tops]) for name in tops[0]}
 
 
 def members(scene: Scene) -> Members:
@@ -98,9 +98,9 @@ def members(scene: Scene) -> Members:
         nominal = replace(nominal, continuation=type(scene.continuation)())
     own = grid(nominal, empty=True, more=True)
     columns = design(scene.ranges, scene.sampled).T
-    found = Members(scene, own, {path: frozen(values) for path, values in zip(scene.ranges, columns, strict=True)})
+    sampled = Members(scene, own, {path: frozen(values) for path, values in zip(scene.ranges, columns, strict=True)})
     points = Points(own.base)
-    for number in range(found.count):
-        for place in {0, own.size - 1}:
-            points.raw(found.values(number * own.size + place))
-    return found
+    for number in range(sampled.count):
+        for point in {0, own.size - 1}:
+            points.raw(sampled.values(number * own.size + point))
+    return sampled

@@ -23,7 +23,7 @@ _NAMED = 3
 
 #: fraction of a curve's points that are ok for its peak to count, and of samples with such curves for a sentence
 COMPLETE, _MOST_SAMPLES = 0.9, 0.5
-#: what ensembles do not have, and why
+#: quantities that ensembles lack, and why
 _ONE, _MANY = "an ensemble keeps one number a point", "not kept of an ensemble; sweep one of its samples"
 _PEAK = "the peak without bodies is in `reduction`, others are not kept"
 NOT_IN_ENSEMBLES = {
@@ -33,14 +33,14 @@ NOT_IN_ENSEMBLES = {
 PEAK, REDUCTION = "peak_amplitude", "reduction"
 
 
-def kept() -> dict[str, Quantity]:
+def of_samples() -> dict[str, Quantity]:
     """Return what is kept of all samples, by name: of bodies, hot spots and sectors the largest."""
     found = (one for one in table().values() if not one.text and one.lacking(NOT_IN_ENSEMBLES) is None)
     return {one.name: one._replace(dims=()) for one in found}
 
 
 def spreads() -> dict[str, Quantity]:
-    """Return the results whose spread is told: at every point of the grid, and of the whole curve along its frequency.
+    """Return the results with a spread: at every point of the grid, and of the whole curve along its frequency.
 
     Of a curve: the highest mean, m, as amplitude_mean_dynamic; what the bodies take of the maximum without bodies; and
     the highest stress, wear and so on.
@@ -68,7 +68,7 @@ class Ensemble(OverAxes):
     """dotted path -> values, of its [sweep] table; empty for a run at one frequency"""
     samples: Annotated[Mapping[str, np.ndarray], Paths(dimension, unit_of, "sample", "number")]
     """dotted path -> (s,) values of each range"""
-    members: Annotated[Mapping[str, np.ndarray], NamedArrays(kept, ("sample", "grid"))]
+    members: Annotated[Mapping[str, np.ndarray], NamedArrays(of_samples, ("sample", "grid"))]
     """(s, *grid) quantities of all points (results.md), of bodies, hot spots and sectors the largest; nan where
     none is"""
     status: Annotated[np.ndarray, Array(("sample", "grid"), dtype=object)]
@@ -104,33 +104,33 @@ class Ensemble(OverAxes):
         return tuple(path for path in self.axes if path != self.swept)
 
     def sentences(self) -> Iterator[str]:
-        """Yield for every curve its reduction with what its spread is due to."""
-        for place in np.ndindex(*self.quantile["reduction"].shape[1:]):
-            at = [f"{path} = {self.axes[path][index]}: " for path, index in zip(self.curves, place, strict=True)]
-            yield "".join(at) + self._sentence(place)
+        """Yield for every curve its reduction with the causes of its spread."""
+        for curve in np.ndindex(*self.quantile["reduction"].shape[1:]):
+            at = [f"{path} = {self.axes[path][index]}: " for path, index in zip(self.curves, curve, strict=True)]
+            yield "".join(at) + self._sentence(curve)
 
-    def _sentence(self, place: tuple[Any, ...]) -> str:
-        low, _, middle, _, high = self.quantile["reduction"][(slice(None), *place)].tolist()
+    def _sentence(self, curve: tuple[Any, ...]) -> str:
+        low, _, middle, _, high = self.quantile["reduction"][(slice(None), *curve)].tolist()
         if not np.isfinite(middle):
             return f"no reduction: nothing to compare with, or no sample has {COMPLETE:.0%} of its runs ok"
-        whole = float(self.complete[(slice(None), *place)].mean())
+        whole = float(self.complete[(slice(None), *curve)].mean())
         if whole < _MOST_SAMPLES:
             return f"no reduction: only {whole:.0%} of the samples have {COMPLETE:.0%} of their runs ok"
-        total, confidence = self.indices["reduction"][(slice(2, 4), slice(None), *place)]
+        total, confidence = self.indices["reduction"][(slice(2, 4), slice(None), *curve)]
         order = [number for number in np.argsort(-total, kind="stable") if np.isfinite(total[number])][:_NAMED]
         due = ", ".join(f"{self.numbers[one]} {total[one]:.2f} ± {confidence[one]:.2f}" for one in order)
         return (
             f"reduction {middle:.3f} in the median, {low:.3f} to {high:.3f} in 90 % of the samples; "
-            f"{f'its spread by total index: {due}' if due else 'it does not spread'}{self._remark(place)}"
+            f"{f'its spread by total index: {due}' if due else 'it does not spread'}{self._remark(curve)}"
         )
 
-    def _remark(self, place: tuple[Any, ...]) -> str:
+    def _remark(self, curve: tuple[Any, ...]) -> str:
         """Return how many samples of a curve have no peak within its range, in words; nothing for none."""
         swept = self.swept
         if swept is None or len(self.axes[swept]) < 2:
             return ""
         mean = np.where(self.status == "ok", self.members[amplitude_mean_dynamic.name], -np.inf)
-        curves = np.moveaxis(mean, 1 + list(self.axes).index(swept), -1)[(slice(None), *place)]
+        curves = np.moveaxis(mean, 1 + list(self.axes).index(swept), -1)[(slice(None), *curve)]
         top = self.axes[swept][curves.argmax(axis=-1)]
         share = float(np.isin(top, (self.axes[swept].min(), self.axes[swept].max())).mean())
         return f"; in {share:.0%} of the samples the peak lies at an edge of the range" if share else ""
@@ -157,7 +157,7 @@ class Ensemble(OverAxes):
 
 
 def complete(ok: np.ndarray, scene: Scene, axes: Mapping[str, Any]) -> np.ndarray:
-    """Return whether enough points of each sample's curve are ok (samples, ...), from those of all (samples, *grid)."""
+    """Return whether enough points of each sample's curve are ok (samples, ...), from all (samples, *grid)."""
     swept = resonance_axis(scene, axes)[0]
     share = ok if swept is None else ok.mean(axis=1 + list(axes).index(swept))
     return np.asarray(share >= COMPLETE)

@@ -3,7 +3,7 @@
 The derivative of a state by an earlier one is the product of the derivatives of the periods between. The exponents are
 the mean growths of its orthogonal factors (Benettin, Galgani, Giorgilli and Strelcyn 1980; with impacts: Müller 1995,
 Chaos, Solitons and Fractals 5); of a motion that repeats, the logarithms of its multipliers. Directions that every
-period moves as they are, such as the place of a body at rest, and those that only feed them, such as the speed of a
+period moves as they are, such as the position of a body at rest, and those that only feed them, such as the speed of a
 body in free flight, are neutral and do not count.
 """
 
@@ -22,7 +22,7 @@ import numpy as np
 from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.model_order.choices import choose
 from vanedamp.coupling.orbits.period_map import PeriodMap, period_map
-from vanedamp.coupling.quantities.exponents import told
+from vanedamp.coupling.quantities.exponents import exponents_as
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.steady_state import mean_confidence
 from vanedamp.coupling.scene.scene import LEAST_EXPONENTS, Scene, loaded
@@ -43,11 +43,11 @@ _NEUTRAL = 1e-9
 
 
 #: of a motion that has no exponent, because its run ended early
-NO_EXPONENT = told(PassageStatus.STOPPED.value, "undecided", ())
+NO_EXPONENT = exponents_as(PassageStatus.STOPPED.value, "undecided", ())
 
 
-class Motion(StrEnum):
-    """What the largest exponent says of a motion."""
+class MotionKind(StrEnum):
+    """Kind of a motion by its largest exponent."""
 
     PERIODIC = "periodic"
     """it repeats, or neighbours approach it, so that it will"""
@@ -75,7 +75,7 @@ class Exponents(Displayed):
     """
 
     status: PassageStatus
-    motion: Motion
+    motion: MotionKind
     exponents: np.ndarray
     confidence: np.ndarray
     repeats: int
@@ -104,8 +104,8 @@ class Exponents(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        own = told(self.status.value, self.motion.value, self.exponents.tolist(), self.error, self.period)
-        return own | {"repeats": self.repeats, "neutral": self.neutral, "periods": self.periods}
+        data = exponents_as(self.status.value, self.motion.value, self.exponents.tolist(), self.error, self.period)
+        return data | {"repeats": self.repeats, "neutral": self.neutral, "periods": self.periods}
 
 
 def lyapunov(
@@ -139,24 +139,24 @@ def _exponents(
     """Return the exponents of the motion of a period map from a state (k,)."""
     states, derivatives, status = [state], list[np.ndarray](), PassageStatus.OK
     order, period = list(PassageStatus), 1.0 / motion.scene.frequency
-    found = _Found(frozen(()), frozen(()), Motion.UNDECIDED, 0, 0)
-    while len(derivatives) < periods and not found.settled:
+    latest = _Found(frozen(()), frozen(()), MotionKind.UNDECIDED, 0, 0)
+    while len(derivatives) < periods and not latest.settled:
         # as many again each time, so that looking at them costs less than the periods
         more = min(max(LEAST_EXPONENTS, len(derivatives)), periods - len(derivatives))
         report = None if progress is None else partial(_report, progress, len(derivatives), periods)
-        for after, derivative, own in motion.each_period(states[-1], more, report):
-            status = max(status, own, key=order.index)
+        for after, derivative, outcome in motion.each_period(states[-1], more, report):
+            status = max(status, outcome, key=order.index)
             if status is not PassageStatus.OK:  # a product without this factor, or with a one-sided one, is none
                 none = frozen(())
-                return Exponents(status, Motion.UNDECIDED, none, none, 0, 0, len(derivatives), period)
+                return Exponents(status, MotionKind.UNDECIDED, none, none, 0, 0, len(derivatives), period)
             states.append(after)
             derivatives.append(derivative * (motion.scale / motion.scale[:, None]))
-        found = _found(np.array(derivatives), np.array(states) / motion.scale)
+        latest = _found(np.array(derivatives), np.array(states) / motion.scale)
     if progress is not None:
         progress(periods, periods)
     return Exponents(
-        status, found.motion, frozen(found.exponents / period), frozen(found.confidence / period), found.repeats,
-        found.neutral, len(derivatives), period,
+        status, latest.motion, frozen(latest.exponents / period), frozen(latest.confidence / period), latest.repeats,
+        latest.neutral, len(derivatives), period,
     )  # fmt: skip
 
 
@@ -169,17 +169,17 @@ class _Found(NamedTuple):
 
     exponents: np.ndarray
     confidence: np.ndarray
-    motion: Motion
+    motion: MotionKind
     repeats: int
     neutral: int
     settled: bool = False
 
 
 def _found(D: np.ndarray, states: np.ndarray) -> _Found:
-    """Return what derivatives (n, k, k) and states (n + 1, k), in sizes of the coordinates, tell."""
-    kept = _decided(D)
-    D, states = kept.T @ D @ kept, states @ kept
-    repeats, neutral = _repetition(states, _SAME), len(kept) - kept.shape[1]
+    """Return what derivatives (n, k, k) and states (n + 1, k), in sizes of the coordinates, say."""
+    basis = _decided(D)
+    D, states = basis.T @ D @ basis, states @ basis
+    repeats, neutral = _repetition(states, _SAME), len(basis) - basis.shape[1]
     # linear motion has the same derivative in every period, whether it repeats or not
     same = repeats or _repetition(D.reshape(len(D), -1), _CONSTANT)
     if not same:
@@ -187,10 +187,10 @@ def _found(D: np.ndarray, states: np.ndarray) -> _Found:
         return _Found(exponents, confidence, _word(exponents, confidence, len(D)), 0, neutral)
     exponents, confidence = _of_multipliers(D, same)
     largest = exponents[0] if len(exponents) else -math.inf
-    word = Motion.PERIODIC if repeats or largest < -_SAME else Motion.QUASI_PERIODIC
+    word = MotionKind.PERIODIC if repeats or largest < -_SAME else MotionKind.QUASI_PERIODIC
     if largest > _SAME:  # a run may come as close to an orbit that it leaves again
-        word = Motion.UNDECIDED
-    settled = word is Motion.PERIODIC and _repetition(states, _SETTLED) == repeats > 0
+        word = MotionKind.UNDECIDED
+    settled = word is MotionKind.PERIODIC and _repetition(states, _SETTLED) == repeats > 0
     return _Found(exponents, confidence, word, repeats, neutral, settled)
 
 
@@ -200,15 +200,15 @@ def _decided(D: np.ndarray) -> np.ndarray:
     A neutral direction is moved by every period along others that are: the space of these grows until no more are.
     """
     k = D.shape[1]
-    kept = np.eye(k)
-    while kept.shape[1]:
-        change = kept.T @ (D - np.eye(k))
+    basis = np.eye(k)
+    while basis.shape[1]:
+        change = basis.T @ (D - np.eye(k))
         _, sizes, rows = np.linalg.svd(np.linalg.qr(change.reshape(-1, k), mode="r"))
         moved = int(np.count_nonzero(sizes > _NEUTRAL * max(1.0, sizes[0])))
-        if moved == kept.shape[1]:
+        if moved == basis.shape[1]:
             break
-        kept = rows[:moved].T
-    return kept
+        basis = rows[:moved].T
+    return basis
 
 
 def _repetition(states: np.ndarray, same: float) -> int:
@@ -256,15 +256,15 @@ def _of_growth(D: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mean[order], error[order]
 
 
-def _word(found: np.ndarray, error: np.ndarray, periods: int) -> Motion:
+def _word(exponents: np.ndarray, error: np.ndarray, periods: int) -> MotionKind:
     """Return the motion by exponents per period and their errors (m,).
 
     Neighbours on a torus part in proportion to time: by a factor n in n periods, which is no exponent.
     """
     least = math.log(periods) / periods
-    bound = least + (error[0] if math.isfinite(found[0]) else 0.0)
-    if found[0] > bound:
-        return Motion.CHAOTIC
-    if found[0] < -bound:
-        return Motion.PERIODIC
-    return Motion.QUASI_PERIODIC if error[0] <= least <= _ZERO else Motion.UNDECIDED
+    bound = least + (error[0] if math.isfinite(exponents[0]) else 0.0)
+    if exponents[0] > bound:
+        return MotionKind.CHAOTIC
+    if exponents[0] < -bound:
+        return MotionKind.PERIODIC
+    return MotionKind.QUASI_PERIODIC if error[0] <= least <= _ZERO else MotionKind.UNDECIDED

@@ -42,9 +42,9 @@ class Method(Protocol):
 
     It may also have RESTARTS = True: its runs leave a state that others can begin with. And WAVEFORMS = True: it takes
     an excitation that is no sum of the system's harmonics, whose loads (k, N), N, at angles omega t (k,) in [0, 2 pi),
-    system.assembly.loads_of returns, in place of the system's. Other methods reject such an excitation.
+    system.assembly.loads_of returns, instead of the system's. Other methods reject such an excitation.
 
-    A method that takes bodies in the plane has PLANAR_LAWS: what it accepts there apart from rigid contacts of one
+    A method that takes planar bodies has PLANAR_LAWS: what it accepts there apart from rigid contacts of one
     restitution, "yields", springs; "two_phases", Poisson's law; "depends_on_speed". It may have RUBBING_WARNING, a
     sentence that every run of such bodies with friction carries, and run_warnings, which yields sentences that every
     run of a scene without open choices carries.

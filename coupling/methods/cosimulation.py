@@ -3,7 +3,7 @@
 The structure's unit is exact between two exchanges (matrix exponential); the bodies' unit takes smaller steps of
 central differences with penalty contacts. Each extrapolates the values of the other by a constant (hold 0) or a line
 (hold 1); the structure gets the mean force of a macro-step, so that no impulse is lost. Jacobi: both units start from
-the last exchange; Gauss-Seidel: the bodies already know the structure's new motion. Kuebler and Schiehlen (2000);
+the last exchange; Gauss-Seidel: bodies use the structure's new motion. Kuebler and Schiehlen (2000);
 Gomes and others, Co-simulation: a survey (2018).
 """
 
@@ -19,13 +19,7 @@ from pydantic import Field
 from scipy.linalg import expm
 
 from vanedamp.coupling.methods import Variant
-from vanedamp.coupling.methods.penalty_forces import (
-    PenaltyLaws,
-    PenaltyOptions,
-    first_forces,
-    penalty_laws,
-    set_forces,
-)
+from vanedamp.coupling.methods.penalty_forces import PenaltyLaws, PenaltyOptions, first_forces, penalty_laws, set_forces
 from vanedamp.coupling.methods.step_records import close_step, copy, open_step, set_gaps
 from vanedamp.coupling.methods.time_stepping import SteppedRun, TimeGrid, loads_at, start, time_grid
 from vanedamp.coupling.numerics.codes import DONE, STEPS
@@ -105,15 +99,15 @@ def macro_step_radii(scene: Scene) -> list[tuple[str, float]]:
     system = on_structure(assemble(scene))
     times = time_grid(scene, system, options.steps_per_period)
     laws, sides = penalty_laws(system, times.step, options), system.surface[: system.contacts]
-    matrix, found = cosimulation_matrices(scene, system, times)[0], []
+    matrix, radii = cosimulation_matrices(scene, system, times)[0], []
     for name, left_out in (("all contacts but those at right walls", RIGHT), ("all but those at left walls", LEFT)):
         closed = np.flatnonzero(sides != left_out)
         if len(closed):
             with np.errstate(over="ignore", invalid="ignore"):
                 step = linear_macro_step(system, laws, times.step, matrix, closed, options)
             finite = bool(np.isfinite(step).all())
-            found.append((name, float(np.abs(np.linalg.eigvals(step)).max()) if finite else np.inf))
-    return found
+            radii.append((name, float(np.abs(np.linalg.eigvals(step)).max()) if finite else np.inf))
+    return radii
 
 
 def linear_macro_step(
@@ -137,9 +131,9 @@ def linear_macro_step(
     wall, speed, bend = (on_structure @ part for part in (p, speed, bend))
     for k in range(1, options.substeps + 1):
         x = x + small * half
-        place, pace = wall + k * small * (speed + 0.5 * k * small * bend), speed + k * small * bend
+        position, pace = wall + k * small * (speed + 0.5 * k * small * bend), speed + k * small * bend
         last = force
-        force = -laws.spring[closed, None] * (place + on_bodies @ x) - laws.dashpot[closed, None] * (
+        force = -laws.spring[closed, None] * (position + on_bodies @ x) - laws.dashpot[closed, None] * (
             pace + on_bodies @ half
         )
         impulse += 0.5 * small * (last + force)
@@ -148,7 +142,7 @@ def linear_macro_step(
 
 
 def cosimulation_matrices(scene: Scene, system: System, times: TimeGrid) -> tuple[np.ndarray, np.ndarray]:
-    """Return the exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, (steps, 2n) shares of
+    """Return the exact step of the structure: (2n, 4n) on p, p', constant and linear modal loads, (steps, 2n) parts of
     the excitation at each step of a period. Loads that are no harmonics are linear over a macro-step.
     """
     sampled = scene.excitation.signal is not None
@@ -198,15 +192,15 @@ def march_cosimulation(
         k = open_step(system, times, motion, records, substeps)
         _structure(system, times, motion, matrix, excited, known, last_force, older_force, hold, k)
         for a in range(len(motion.live)):
-            row, place, rate, bend = motion.live[a], 0.0, 0.0, 0.0
+            row, position, rate, bend = motion.live[a], 0.0, 0.0, 0.0
             motion.before[row], impulse[row] = row_speed(system, row, v), 0.0
             for i in range(n):
-                place += system.J[row, i] * q[i]
+                position += system.J[row, i] * q[i]
                 rate += system.J[row, i] * ((motion.q[i] - q[i]) / h if gauss_seidel and hold == 0 else v[i])
                 if hold == 1:
                     change = motion.v[i] - v[i] if gauss_seidel else v[i] - last_speed[i]
                     bend += system.J[row, i] * change / h
-            motion.rows[0, row], motion.rows[1, row], motion.rows[2, row] = place, rate, bend
+            motion.rows[0, row], motion.rows[1, row], motion.rows[2, row] = position, rate, bend
         copy(v, last_speed)
         _bodies(system, times, motion, loads, laws, substeps, k, memory[2, :rows], memory[2, rows : 2 * rows])
         copy(last_force, older_force)
@@ -241,11 +235,11 @@ def _structure(system, times, motion, matrix, excited, known, force, older, hold
 
 
 @kernel
-def _bodies(system, times, motion, loads, laws, substeps, k, place, rate):
+def _bodies(system, times, motion, loads, laws, substeps, k, position, rate):
     """Advance the bodies by a macro-step on walls of known motion; add up the impulses of the rows.
 
     motion.rows: displacement, speed and acceleration (2u,) of the rows by the structure's motion, and their impulses.
-    place, rate: (2u,) scratch.
+    position, rate: (2u,) scratch.
     """
     n, size, small = system.modes, len(motion.q), times.step / substeps
     for j in range(substeps):
@@ -255,13 +249,13 @@ def _bodies(system, times, motion, loads, laws, substeps, k, place, rate):
         for a in range(len(motion.live)):
             row = motion.live[a]
             speed, bend = motion.rows[1, row], motion.rows[2, row]
-            place[row], rate[row] = motion.rows[0, row] + t * (speed + 0.5 * t * bend), speed + t * bend
+            position[row], rate[row] = motion.rows[0, row] + t * (speed + 0.5 * t * bend), speed + t * bend
             for i in range(n, size):
-                place[row] += system.J[row, i] * motion.q[i]
+                position[row] += system.J[row, i] * motion.q[i]
                 rate[row] += system.J[row, i] * motion.half[i]
         for r in range(system.contacts):
-            place[r] += system.rest[r]
-        set_forces(system, laws, motion, place, place, rate, small)
+            position[r] += system.rest[r]
+        set_forces(system, laws, motion, position, position, rate, small)
         for a in range(len(motion.live)):
             motion.rows[3, motion.live[a]] += motion.impulse[motion.live[a]]
         for i in range(n, size):

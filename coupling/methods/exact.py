@@ -29,7 +29,7 @@ class Options(PlanarOptions):
 
 
 def begin(scene: Scene, system: System, records: Records, events: bool, start: RestartState) -> Run:
-    """Return a run by the engine, whose kernels are loaded when they are wanted."""
+    """Return a run by the engine, whose kernels are loaded on demand."""
     from vanedamp.coupling.engine.backends import engine_run
 
     options: Any = scene.solver

@@ -210,7 +210,7 @@ def _two_phases(system, motion, problem, turned, tolerance):
 
 @kernel
 def _expand(system, problem, count, approach):
-    """Set the impulses of expansion that those of compression ask for; the rest is the same problem beside them."""
+    """Set the impulses of expansion after compression; the rest is the same problem besides."""
     box = problem.box
     for a in range(count):
         r = problem.row[a]
@@ -228,8 +228,8 @@ def _list_rows(system, motion, problem, h, theta, turn):
     """Set up the problem of the rows that take part in a turn. Return their number."""
     u, count, free, slowest = len(system.rest), ZERO, motion.coordinates[_FREE], motion.slowest[0]
     first = u - len(system.tangential)
-    for place in range(u):
-        r = problem.order[place]
+    for rank in range(u):
+        r = problem.order[rank]
         if r >= system.contacts:
             low, high = -h * system.limit[r] - motion.impulse[u + r], h * system.limit[r] - motion.impulse[u + r]
             now, soft = row_speed(system, u + r, free), 0.0
@@ -303,7 +303,7 @@ def _rebound(system, motion, problem, count, turn, tolerance):
 def _brings_energy(system, motion, problem, count, turn, factor):
     """Whether the impulses of rigid contacts bring energy, by the speeds before and after the step's loads.
 
-    The loads alone may let it seem so by one of them: where they pull a contact open, or turn a slip round.
+    The loads alone may let it seem so by one: where they pull a contact open, or turn a slip round.
     """
     u, early, late, terms = len(system.rest), 0.0, 0.0, 0.0
     for a in range(count):

@@ -187,7 +187,7 @@ def _predict(system, times, motion, problem, parameters, inverse, laws, k):
 
 @kernel
 def _correct(system, times, motion, problem, parameters, turned, count):
-    """Let the forces of the problem act in the step, whose mean forces give the impulses."""
+    """Apply the problem's forces in the step; their means give the impulses."""
     beta, gamma, h, force = parameters[1], parameters[2], times.step, problem.box.force
     accel, ahead, fast = motion.coordinates[0], motion.coordinates[1], motion.coordinates[2]
     copy(motion.force, motion.impulse)
@@ -214,8 +214,8 @@ def _correct(system, times, motion, problem, parameters, turned, count):
 def _list_rows(system, problem, laws, h, ahead, fast, last, beta, gamma):
     """Set up the problem of the rows that may carry force. Return their number."""
     count, u, first = ZERO, len(system.rest), len(system.rest) - len(system.tangential)
-    for place in range(u):
-        r = problem.order[place]
+    for rank in range(u):
+        r = problem.order[rank]
         slip = row_speed(system, u + r, fast) / (gamma * h)
         if r < system.contacts:
             opened = gap(system, r, ahead)

@@ -1,4 +1,4 @@
-"""Penalties in place of constraints: springs for contacts, viscous friction below a slip speed, and their forces."""
+"""Penalties instead of constraints: springs for contacts, viscous friction below a slip speed, and their forces."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def first_share(gap, rate, last, h):
     """Return by how much the dashpot of a closed contact counts in a step of h: 1, except in a contact's first.
 
     Its force jumps as the contact closes, and a step's force stands for half a step before and after it: in the first,
-    for the time since then and half a step. Without this restitution scatters by the place of the contact in its step.
+    for the time since then and half a step. Without this restitution scatters by the contact's instant in its step.
     last: force of the step before, N.
     """
     if last > 0.0 or rate >= 0.0 or h == 0.0:
@@ -96,7 +96,7 @@ def first_share(gap, rate, last, h):
 def set_forces(system, laws, motion, gap, drawn, rate, h):
     """Set the forces of all rows by their laws, at gaps (u,) and rates (2u,) of the rows, and their impulses.
 
-    drawn: (2u,) displacement of what draws the sliders of Jenkins elements, by their rows. They follow in motion.q
+    drawn: (2u,) displacement of the drivers of sliders of Jenkins elements, by their rows. They follow in motion.q
     where their springs would go beyond their bounds. h: time since the last forces, s.
     """
     u, sliders, q = len(system.rest), len(system.tangential), motion.q
@@ -135,7 +135,7 @@ def _put(motion, row, force, h):
 def set_rows(system, motion, q, v):
     """Set gaps and speeds (motion.before) of the rows that may have forces, at coordinates q and velocities v.
 
-    motion.rows[0]: displacements of what draws the sliders of Jenkins elements.
+    motion.rows[0]: displacements of the drivers of sliders of Jenkins elements.
     """
     u = len(system.rest)
     set_gaps(system, motion)

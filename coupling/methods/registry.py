@@ -34,7 +34,7 @@ def respond(
     progress: Callable[[int, int], None] | None = None,
     started: float | None = None,
 ) -> Response:
-    """Return the response of a scene without open choices, with what some observers keep.
+    """Return the response of a scene without open choices, with some observers' data.
 
     start, progress: as in coupling.simulation.simulate; started: when its time began (time.perf_counter), if before.
     """
@@ -45,7 +45,7 @@ def respond(
 
 
 def wall_warnings(scene: Scene, axes: Mapping[str, Sequence[Any]], depth: np.ndarray) -> tuple[str, ...]:
-    """Return the warning that bodies are deep in rigid walls, of methods with springs in their place; empty without.
+    """Return the warning that bodies are deep in rigid walls, of methods with springs instead; empty without.
 
     depth: penetration over the free travel, (..., *grid) over the axes of a sweep.
     """
@@ -74,7 +74,7 @@ def final_state(scene: Scene, run: Run) -> RestartState | None:
 
 
 def run_of(scene: Scene, observers: Sequence[Observer] = (), start: RestartState | None = None) -> Run:
-    """Return a run of the scene's method at time zero, which records what some observers need.
+    """Return a run of the scene's method at time zero, with records for some observers.
 
     Raises InputError for a scene that the method cannot run, such as one that begins with the state of another run.
     """
@@ -108,7 +108,7 @@ def _check_bodies(scene: Scene, system: System) -> None:
             raise InputError(f'damper[{number}].shape: "auto" is still open; model_order.choices.choose settles it')
     if not system.in_plane:
         return
-    taken = {name: set(part.PLANAR_LAWS) for name, part in METHODS.all().items() if hasattr(part, "PLANAR_LAWS")}
+    taken = {name: set(method.PLANAR_LAWS) for name, method in METHODS.all().items() if hasattr(method, "PLANAR_LAWS")}
     law, name = scene.contact, scene.solver.method
     asked = {"yields": scene.yields, "two_phases": law.two_phases, "depends_on_speed": law.depends_on_speed}
     wanted = {ability for ability, needs in asked.items() if needs}
@@ -148,5 +148,5 @@ def _why_not(method: str, ability: str) -> str | None:
     """Return why a method lacks an ability, RESTARTS, WAVEFORMS or WEARS; None if it has it."""
     if getattr(METHODS.part(method), ability, False):
         return None
-    able = [name for name, part in METHODS.all().items() if getattr(part, ability, False)]
+    able = [name for name, solver in METHODS.all().items() if getattr(solver, ability, False)]
     return f"is for solver.method {' or '.join(able)}, not {method}"

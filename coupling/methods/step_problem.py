@@ -4,7 +4,7 @@ The speeds A f + b of the rows and their forces (or impulses) f obey the conditi
 force of another row may widen the bounds: low - mu f_N <= f <= high + mu f_N, Coulomb's law where f_N is the force of
 the contact's normal. Without such rows, pivots solve the problem; with them, Lemke's method does (Glocker and Pfeiffer
 1996). Projected Gauss-Seidel iteration (Jourdan, Alart and Jean 1998) solves both, one force after the other, and
-shares nothing with them.
+has nothing in common with them.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ class StepProblem(NamedTuple):
     """A problem of up to k rows of the units (u,), with the space to solve it."""
 
     exact: bool | None  # None: by iteration; the compiler leaves the others out
-    order: np.ndarray  # (u,) int: units in the order in which they enter
+    order: np.ndarray  # (u,) int: units in the order they enter
     mobility: np.ndarray  # (2u, 2u) of all rows
     row: np.ndarray  # (k,) int: the rows that take part
     now: np.ndarray  # (k,) their speeds without the unknown forces
-    asked: np.ndarray  # (k,) what restitution asks for beside, less than zero
+    asked: np.ndarray  # (k,) what restitution adds, less than zero
     friction: np.ndarray  # (k,) mu
-    normal: np.ndarray  # (k,) int: place of the row of f_N
+    normal: np.ndarray  # (k,) int: index of the row of f_N
     box: Problem
     lemke: Lemke | None  # None: no row widens the bounds of another, or by iteration
     place: np.ndarray  # (k,) int, scratch: first unknown of each row
@@ -82,7 +82,7 @@ def list_slip(system, problem, count, r, now, bound, had):
 
 @kernel
 def solve_rows(problem, count, factor, tolerance):
-    """Solve the problem of the first rows with a factor of what restitution asks for: box.force, box.acceleration.
+    """Solve the problem of the first rows with a factor of restitution's speeds: box.force, box.acceleration.
 
     tolerance: by how much a sweep of the iteration may still change a speed, m/s. Returns False without a solution.
     """
@@ -98,7 +98,7 @@ def solve_rows(problem, count, factor, tolerance):
 
 @kernel
 def _solve(problem, exact, lemke, count, tolerance):
-    """Solve the problem of several rows in the way that there is room for."""
+    """Solve the problem of several rows in the way there is room for."""
     if exact is None:
         return _iterate(problem, count, tolerance)
     if lemke is None:
@@ -118,14 +118,14 @@ def _iterate(problem, count, tolerance):
             wide = 0.0
             if problem.friction[a] > 0.0:
                 wide = problem.friction[a] * box.force[problem.normal[a]]
-            own = box.matrix[a, a]
-            wanted = min(max(box.force[a] - box.acceleration[a] / own, box.low[a] - wide), box.high[a] + wide)
+            diagonal = box.matrix[a, a]
+            wanted = min(max(box.force[a] - box.acceleration[a] / diagonal, box.low[a] - wide), box.high[a] + wide)
             change = wanted - box.force[a]
             if change != 0.0:
                 box.force[a] = wanted
                 for c in range(count):
                     box.acceleration[c] += box.matrix[c, a] * change
-            largest = max(largest, abs(change) * own)
+            largest = max(largest, abs(change) * diagonal)
         if largest <= tolerance:
             return True
     return False
@@ -151,12 +151,12 @@ def _solve_lemke(problem, lemke, count):
     for a in range(count):
         i, weight, speed = problem.place[a], problem.weight[a], box.b[a]
         for c in range(count):
-            part = box.matrix[a, c]
-            speed += part * _least(problem, c)
-            lemke.matrix[i, problem.place[c]] += weight * problem.weight[c] * part
+            element = box.matrix[a, c]
+            speed += element * _least(problem, c)
+            lemke.matrix[i, problem.place[c]] += weight * problem.weight[c] * element
             if problem.friction[c] > 0.0:
                 normal = problem.normal[c]
-                entry = weight * problem.weight[normal] * problem.friction[c] * part
+                entry = weight * problem.weight[normal] * problem.friction[c] * element
                 lemke.matrix[i, problem.place[normal]] -= entry
         lemke.q[i] = weight * speed / scale
         if box.high[a] < math.inf:
@@ -182,7 +182,7 @@ def _solve_lemke(problem, lemke, count):
 
 @inlined
 def _least(problem, a):
-    """Return the force of a row where its unknown is zero and so is that of its normal."""
+    """Return the force of a row where its and its normal's unknowns are zero."""
     least = problem.box.low[a]
     if problem.friction[a] > 0.0:
         least -= problem.friction[a] * problem.box.low[problem.normal[a]]

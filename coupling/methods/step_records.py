@@ -4,16 +4,7 @@ from __future__ import annotations
 
 import math
 
-from vanedamp.coupling.numerics.codes import (
-    DIVERGED,
-    DONE,
-    EVENT_BUDGET,
-    IMPACTS,
-    LOGGED,
-    PENETRATION,
-    PERIOD,
-    STEPS,
-)
+from vanedamp.coupling.numerics.codes import DIVERGED, DONE, EVENT_BUDGET, IMPACTS, LOGGED, PENETRATION, PERIOD, STEPS
 from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.response.recorder import note_outputs, note_step, note_tilts, put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
@@ -52,7 +43,7 @@ def drag_sliders(system, q):
 
 @inlined
 def set_gaps(system, motion):
-    """Set the gaps at the end of a step; those of the last one are where it began."""
+    """Set the gaps at the end of a step; the last one's are where it began."""
     for r in range(system.contacts):
         motion.gap[1, r] = motion.gap[0, r]
         motion.gap[0, r] = gap(system, r, motion.q)
@@ -60,7 +51,7 @@ def set_gaps(system, motion):
 
 @kernel
 def record_start(system, motion, records):
-    """Record section, energies and ledger at the start of a period, those of all springs included."""
+    """Record section, energies and ledger at the start of a period, all springs included."""
     springs = 0.0
     for r in range(system.contacts):
         motion.gap[0, r] = gap(system, r, motion.q)
@@ -93,7 +84,7 @@ def open_step(system, times, motion, records, substeps):
 
 @inlined
 def close_step(system, times, motion, records, log, k, budget, deepest):
-    """Follow contacts and account for step k of the period, with motion.impulse and gap; close the last one's period.
+    """Follow contacts and add up step k of the period, with motion.impulse and gap; close the last one's period.
 
     Returns DONE, DIVERGED, PENETRATION or EVENT_BUDGET.
     """
@@ -123,7 +114,7 @@ def _response(system, times, k, q, v):
 
 @kernel
 def _account(system, times, motion, records, k, deepest):
-    """Account for step k of the period: energies by midpoints, response. Returns DONE, DIVERGED or PENETRATION."""
+    """Add up step k of the period: energies by midpoints, response. Returns DONE, DIVERGED or PENETRATION."""
     h, p, q, v = times.step, motion.counters[PERIOD], motion.start[0], motion.start[1]
     x1 = _record_response(system, times, motion, records, k)
     size, deep, hit = abs(x1), 0.0, False
@@ -143,7 +134,7 @@ def _account(system, times, motion, records, k, deepest):
             motion.ledger[CONTACT] -= 0.5 * motion.spring[r] * stored
         elif motion.impulse[r] > 0.0 and motion.before[r] < -motion.slowest[0]:
             hit = True
-    _account_forces(system, motion, h, hit)
+    _add_losses(system, motion, h, hit)
     for j in range(len(system.tangential)):
         stored = elongation(system, j, motion.q) ** 2 - elongation(system, j, q) ** 2
         motion.ledger[FRICTION] -= 0.5 * system.tangential[j] * stored
@@ -180,8 +171,8 @@ def _record_response(system, times, motion, records, k):
 
 
 @inlined
-def _account_forces(system, motion, h, hit):
-    """Enter what the forces of the rows take. hit: whether rigid contacts that approached have pushed in this step.
+def _add_losses(system, motion, h, hit):
+    """Enter the rows' losses. hit: whether rigid contacts that approached have pushed in this step.
 
     What contacts take is then an impact's loss. Impulses of rigid contacts work at the mean of the speeds before and
     after, springs and friction elements along the step's displacement: both differ for theta above 1/2.

@@ -1,6 +1,6 @@
-"""What methods with time steps share: the grid of a period with its loads, matrices, the motion, and the run.
+"""Common to methods with time steps: the grid of a period with its loads, matrices, the motion, and the run.
 
-Runs go from the same system to the same records as those of the exact engine.
+Runs have the exact engine's system and records.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import Loads, loads_of
 from vanedamp.coupling.system.system import System, on_structure
 
-#: imbalance of the ledger above which a response is not to be used
+#: imbalance of the energies above which a response is not to be used
 _OPEN_LEDGER = 0.1
 #: steps of all contacts after which compiled functions return to Python, which sees interrupts and empties the log
 _SLICE = 100_000
@@ -37,13 +37,13 @@ March = Callable[[np.ndarray, int, int, float], int]
 class Sparse(NamedTuple):
     """A square matrix (N, N) without its zeros: up to k entries in each row, the others zeros in column 0."""
 
-    column: np.ndarray  # (N, k) unsigned: no place from the end
+    column: np.ndarray  # (N, k) unsigned: no index from the end
     value: np.ndarray  # (N, k)
 
 
 @record
 class TimeGrid(NamedTuple):
-    """The steps of an excitation period, and what acts on N coordinates and u contacts in them."""
+    """The steps of an excitation period, and loads on N coordinates and u contacts in them."""
 
     step: float  # s
     phase: np.ndarray  # (steps + 1, 2) cos and sin of omega t within a period
@@ -55,7 +55,7 @@ class TimeGrid(NamedTuple):
 
 
 @record
-class Motion(NamedTuple):
+class StepState(NamedTuple):
     """The state of a run, advanced in place. Sizes as in System."""
 
     # changes in every step
@@ -96,8 +96,8 @@ def sparse(matrix: np.ndarray) -> Sparse:
     most = int((matrix != 0.0).sum(axis=1).max(initial=0))
     column, value = np.zeros((len(matrix), most), np.uint64), np.zeros((len(matrix), most))
     for i, row in enumerate(matrix):
-        found = np.flatnonzero(row)
-        column[i, : len(found)], value[i, : len(found)] = found, row[found]
+        nonzero = np.flatnonzero(row)
+        column[i, : len(nonzero)], value[i, : len(nonzero)] = nonzero, row[nonzero]
     return Sparse(column, value)
 
 
@@ -120,15 +120,15 @@ def loads_at(scene: Scene, system: System) -> Loads:
     return loads_of(scene, signal) if signal else lambda angle: (system.phases(angle) @ system.load).real
 
 
-def start(system: System, begun: RestartState, spring: np.ndarray, records: Records) -> tuple[System, Motion]:
-    """Return the system whose slips of Jenkins elements are those of what draws them, and its motion at time zero.
+def start(system: System, begun: RestartState, spring: np.ndarray, records: Records) -> tuple[System, StepState]:
+    """Return the system whose slips of Jenkins elements are those of their drivers, and its motion at time zero.
 
-    spring: (u,) as in Motion.
+    spring: (u,) as in StepState.
     """
     initial = motion_of(system, begun)
     u, size = len(system.rest), len(system.mass)
     contact = np.arange(u) < system.contacts
-    return on_structure(system), Motion(
+    return on_structure(system), StepState(
         q=initial.q.copy(), v=initial.v.copy(), half=np.zeros(size), force=np.zeros(2 * u),
         counters=np.zeros(COUNTERS, np.int64),
         ledger=np.zeros(len(ENERGIES)), deepest=np.zeros(1),
@@ -144,7 +144,7 @@ class SteppedRun:
     """A run of a stepping method, which marches a motion by its steps per period and fills the records."""
 
     def __init__(
-        self, system: System, march: March, motion: Motion, records: Records, events: bool, options: Any
+        self, system: System, march: March, motion: StepState, records: Records, events: bool, options: Any
     ) -> None:
         self.system, self.march, self.motion, self.records, self.options = system, march, motion, records, options
         self.plane = plane_of(system, records, options.linearisation) if system.in_plane else None
@@ -178,12 +178,12 @@ class SteppedRun:
         )  # fmt: skip
 
     def _lasting(self) -> np.ndarray:
-        """Return the entries of impacts whose contacts still carry force, as they are now."""
+        """Return the entries of impacts in contacts that still carry force."""
         m, u = self.motion, len(self.system.rest)
         lasting = np.flatnonzero((m.active == 1) & (m.speed < 0.0)) if len(self.log) else np.zeros(0, int)
         now, total = self.system.J[:u] @ m.v, np.split(m.total, 2)
-        found = np.column_stack([m.begun, np.full(u, IMPACT), np.arange(u), m.speed, now, *total, m.lost])[lasting]
-        return found[:, : WIDTH if self.plane else LINE_WIDTH]
+        rows = np.column_stack([m.begun, np.full(u, IMPACT), np.arange(u), m.speed, now, *total, m.lost])[lasting]
+        return rows[:, : WIDTH if self.plane else LINE_WIDTH]
 
     def final(self) -> None:
         """Return None: the state between two steps is no state that another run could begin with."""

@@ -42,7 +42,7 @@ from vanedamp.files.toml_input import InputError
 #: periods up to which blocks run without a check: it takes some 1500 periods of a block where tilts persist, and at
 #: five points of a sweep, where they do not, 2500 to 8000 (docs/which_body.md)
 WORTH = 6_000
-#: relative error of the mean amplitude that is allowed unless a body says otherwise
+#: default tolerance of the mean amplitude, relative
 TOLERANCE = 0.05
 #: tilts that blocks begin with, as fractions of the largest that their cavity allows; fraction above which it has grown
 _SMALL, _LARGE, _GROWN = 1e-4, 0.3, 0.05
@@ -125,7 +125,7 @@ def with_blocks(scene: Scene, share: float = _LARGE) -> tuple[Scene, RestartStat
 
 
 def judge_all(scenes: Sequence[Scene]) -> Advice:
-    """Return the advice that suits all of these scenes: blocks as soon as one of them needs blocks."""
+    """Return the advice that suits all of these scenes: blocks as soon as one needs blocks."""
     advices: list[Advice] = []
     for scene in scenes:
         advices.append(judge(scene))
@@ -155,7 +155,7 @@ def _tolerance(scene: Scene) -> float:
 
 
 def judge(scene: Scene) -> Advice:
-    """Return the advice for a scene with bodies of shape "auto", all of them alike. Raises InputError."""
+    """Return the advice for a scene with bodies of shape "auto", all alike. Raises InputError."""
     tolerance = _tolerance(scene)
     sliders = with_sliders(scene)
     settled = short_transient(sliders)
@@ -249,15 +249,15 @@ def _error(slider: Run, settled: int, blocks: Sequence[Run], tolerance: float) -
     The runs end before they have settled as well, if they show by then that it exceeds the tolerance. Where it stays
     within, they continue, and the worse one of both windows counts. Raises _Ended.
     """
-    own = 2 * settled + _SLIDER_WINDOW
+    periods = 2 * settled + _SLIDER_WINDOW
     early, last = max(settled, 2 * _WATCH), settled + _WINDOW
-    error, confidence = _compared(slider, own, blocks, early, early // 2)
+    error, confidence = _compared(slider, periods, blocks, early, early // 2)
     if abs(error) - confidence > tolerance:
         return error, confidence
-    error, confidence = _compared(slider, own, blocks, last, settled)
+    error, confidence = _compared(slider, periods, blocks, last, settled)
     if abs(error) + confidence > tolerance:
         return error, confidence
-    later = _compared(slider, own + _LATER, blocks, last + _LATER, last)
+    later = _compared(slider, periods + _LATER, blocks, last + _LATER, last)
     return max((error, confidence), later, key=lambda found: abs(found[0]) + found[1])
 
 
@@ -267,16 +267,16 @@ def _peaks(run: Run, first: int, done: int) -> np.ndarray:
     return about_mean(outcome.records, first, done, outcome.system.period)[1]
 
 
-def _compared(slider: Run, own: int, blocks: Sequence[Run], done: int, dropped: int) -> tuple[float, float]:
-    """Return error and confidence from the last periods of the slider's `own`, and the blocks' from dropped to done."""
-    _advance(slider, own)
+def _compared(slider: Run, periods: int, blocks: Sequence[Run], done: int, dropped: int) -> tuple[float, float]:
+    """Return error and confidence of the slider's last periods from the blocks', dropped to done."""
+    _advance(slider, periods)
     for block in blocks:
         _advance(block, done)
         plane = block.outcome().plane
         assert plane is not None
         if np.nanmax(plane.neglected * plane.tilt[dropped:done] ** 2) > plane.bound:
             raise _Ended(Status.TILTED.value)
-    peaks = _peaks(slider, own - _SLIDER_WINDOW, own)
+    peaks = _peaks(slider, periods - _SLIDER_WINDOW, periods)
     mean, width = float(peaks.mean()), mean_confidence(peaks) or 0.0
     size = (done - dropped) // _BATCHES
     series = np.array([_peaks(block, done - size * _BATCHES, done) for block in blocks])

@@ -29,7 +29,7 @@ _POINTS = 5
 
 
 class Choices(NamedTuple):
-    """What was chosen: numbers of modes by model, and the advice on bodies, None where none was open."""
+    """The choices: numbers of modes by model, and the advice on bodies, None where none was open."""
 
     modes: selection.Choices
     body: Advice | None = None
@@ -42,7 +42,7 @@ NOTHING = Choices({})
 class Chosen(NamedTuple):
     """A scene without open choices, the estimate of its model and the advice on its bodies (None: were not open).
 
-    start: the state with which it begins, in place of its own initial one (None).
+    start: the state with which it begins, instead of its own initial one (None).
     """
 
     scene: Scene
@@ -52,7 +52,7 @@ class Chosen(NamedTuple):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is to be read before the scene's results are used."""
+        """Notes to read before the scene's results are used."""
         apart = (self.estimate or {}).get("states_apart", 0.0)
         states = (
             f"structure.modes: steady states differ by {100.0 * apart:.2g} % of the peak without bodies, more than the "
@@ -77,7 +77,7 @@ def choose(scene: Scene, more: bool = False) -> Chosen:
 def choices_of(scenes: Iterable[Scene], more: bool = False) -> Choices:
     """Return the choices that suit all of these scenes. Raises InputError when there is no good one.
 
-    more: whether many more periods will be run than those of the scenes: fewer are not worth a choice.
+    more: whether many more periods follow: fewer are not worth a choice.
     """
     scenes = [unrolled(scene) for scene in scenes]
     modes = selection.choices_of(scenes, more)
@@ -87,11 +87,11 @@ def choices_of(scenes: Iterable[Scene], more: bool = False) -> Choices:
     if not more and (periods := selection.periods_of(undecided)) <= WORTH:
         return Choices(modes, unjudged(undecided, periods))
     tried = np.unique(np.linspace(0, len(undecided) - 1, _POINTS).round().astype(int))
-    return Choices(modes, judge_all([selection.with_choice(undecided[place], modes).scene for place in tried]))
+    return Choices(modes, judge_all([selection.with_choice(undecided[index], modes).scene for index in tried]))
 
 
 def with_choices(scene: Scene, choices: Choices) -> Chosen:
-    """Return the scene with the choices that were made for it, and what is repeated over a ring written out."""
+    """Return the scene with the choices that were made for it, and ring repetitions written out."""
     scene = unrolled(scene)
     selected, body = selection.with_choice(scene, choices.modes), choices.body
     if body is None or not needs_body(scene):

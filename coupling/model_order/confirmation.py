@@ -2,7 +2,7 @@
 
 The estimate weighs errors of forces; it does not predict which of several steady states a start reaches. So both models
 run until they are steady from the same two starts, the scene's own and one whose bodies fly, and a smaller model is
-taken if its mean amplitude is the whole one's from each of them, within the tolerance. The whole model is taken where
+taken if its mean amplitude is the whole one's from each, within the tolerance. The whole model is taken where
 its own steady states differ by more, since other starts may then reach another one on a smaller model, where a run
 does not become steady, and where so few periods are to be run that no choice pays.
 """
@@ -28,7 +28,7 @@ from vanedamp.rom.error_estimate import Choice, Rung
 #: periods up to which the whole model runs before a choice of one takes its time: a choice takes as long as some 10,000
 #: periods of the whole model, for 10 to 100 coordinates (docs/reduction.md)
 WORTH = 20_000
-#: scenes that are tried, fewest and most, evenly spread over their frequencies, and periods to be run for each of them
+#: scenes that are tried, fewest and most, evenly spread over their frequencies, and periods to be run for each
 _SCENES, _EACH = (3, 9), 10_000
 #: models that are tried
 _MODELS = 4
@@ -84,8 +84,8 @@ def confirmed(choice: Choice, scenes: Sequence[Scene], periods: float) -> Confir
     by_frequency = sorted(scenes, key=lambda scene: scene.frequency)
     count = min(len(scenes), int(np.clip(periods // _EACH, *_SCENES)))
     pairs = []
-    for place in np.unique(np.linspace(0, len(scenes) - 1, count).round().astype(int)):
-        pairs.append(_Pair(by_frequency[place], whole, tolerance, min(_LONGEST, periods / (2 * count))))
+    for index in np.unique(np.linspace(0, len(scenes) - 1, count).round().astype(int)):
+        pairs.append(_Pair(by_frequency[index], whole, tolerance, min(_LONGEST, periods / (2 * count))))
         apart = pairs[-1].apart
         if np.isnan(apart):
             return _with(choice, whole, "the whole model, as its runs are not steady enough to compare a smaller one")
@@ -103,9 +103,9 @@ def confirmed(choice: Choice, scenes: Sequence[Scene], periods: float) -> Confir
 
 def _named(rung: Rung) -> str:
     """Return a model in words."""
-    what = f"{rung.modes} mode{'s' * (rung.modes != 1)}"
+    words = f"{rung.modes} mode{'s' * (rung.modes != 1)}"
     extra = rung.size - rung.modes
-    return f"{what} and {extra} attachment mode{'s' * (extra != 1)}" if rung.attached else what
+    return f"{words} and {extra} attachment mode{'s' * (extra != 1)}" if rung.attached else words
 
 
 def _with(choice: Choice, rung: Rung, why: str, difference: float | None = None, apart: float = 0.0) -> Confirmed:

@@ -81,7 +81,7 @@ def select_model_orders(scenes: Sequence[Scene]) -> list[Selected]:
 def choices_of(scenes: Iterable[Scene], more: bool = False) -> Choices:
     """Return the number of modes that suits all scenes with one model and tolerance, for each of these.
 
-    more: whether many more periods will be run than those of the scenes.
+    more: whether many more periods follow.
     Raises InputError for a scene with stops, whose impacts the estimate does not include, and for one whose sines it
     cannot try.
     """
@@ -217,10 +217,10 @@ def _shared_flexibility(scene: Scene, structure: Rom) -> dict[str, Any] | None:
     residual = model.residual_flexibility
     if residual is None:
         return None
-    own, largest = min((law.flexibility(damper.mass) for damper in scene.damper), default=0.0), 0.0
+    of_law, largest = min((law.flexibility(damper.mass) for damper in scene.damper), default=0.0), 0.0
     for (one, first), (other, second) in itertools.combinations(_touched(scene, model), 2):
         if one != other:
-            size = math.sqrt((residual[first, first] + own) * (residual[second, second] + own))
+            size = math.sqrt((residual[first, first] + of_law) * (residual[second, second] + of_law))
             largest = max(largest, abs(float(residual[first, second])) / size if size > 0.0 else 0.0)
     if largest <= _SHARED:
         return None
@@ -232,13 +232,13 @@ def _shared_flexibility(scene: Scene, structure: Rom) -> dict[str, Any] | None:
 
 
 def _touched(scene: Scene, model: ReducedModel) -> list[tuple[int, int]]:
-    """Return (body, wall's place in the interface) of all contacts of bodies with walls."""
-    found = []
+    """Return (body, wall's index in the interface) of all contacts of bodies with walls."""
+    pairs = []
     for cavity in scene.cavity:
         bodies = scene.bodies_in(cavity)
         ends = zip(bodies[:1] + bodies[-1:], cavity.labels()[:2], strict=False)
-        found += [(body, model.interface.index(label)) for body, label in ends if label in model.interface]
-    return found
+        pairs += [(body, model.interface.index(label)) for body, label in ends if label in model.interface]
+    return pairs
 
 
 def _choice(scenes: Sequence[Scene], periods: float) -> Choice:
@@ -253,17 +253,17 @@ def _choice(scenes: Sequence[Scene], periods: float) -> Choice:
     labels = list(dict.fromkeys([at, *forced, *(label for scene in scenes for label in _surfaces(scene))]))
     driven = [scene.frequency * order for scene in scenes for order in scene.excitation.shares]
     speeds = sorted({scene.speed for scene in scenes})
-    found = []
-    for place in np.unique(np.linspace(0, len(speeds) - 1, _SPEEDS).astype(int)):
-        model = reduced_model(replace(structure, modes=None), speeds[place])
+    compared = []
+    for index in np.unique(np.linspace(0, len(speeds) - 1, _SPEEDS).astype(int)):
+        model = reduced_model(replace(structure, modes=None), speeds[index])
         for label in labels:
             if label not in model.interface:
                 raise InputError(f"structure: no interface label '{label}'; it has {', '.join(model.interface)}")
-        own = [scene for scene in scenes if scene.speed == speeds[place]]
-        found.append(_ladders(own, model, frequency_grid(model, min(driven), max(driven)), at, labels, brief))
-    rigid = max(ladders.rigid for ladders in found)
+        at_speed = [scene for scene in scenes if scene.speed == speeds[index]]
+        compared.append(_ladders(at_speed, model, frequency_grid(model, min(driven), max(driven)), at, labels, brief))
+    rigid = max(ladders.rigid for ladders in compared)
     choices = [
-        choose(worst_rungs([ladders.rungs[attached] for ladders in found]), structure.tolerance, rigid)
+        choose(worst_rungs([ladders.rungs[attached] for ladders in compared]), structure.tolerance, rigid)
         for attached in (False, True)
     ]
     # the first of equals: natural modes without attachment modes
@@ -338,7 +338,7 @@ def _waves(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> np.nda
 
 
 def _glued(scene: Scene, model: ReducedModel) -> ReducedModel:
-    """Return the model with every body fixed to its cavity's floor."""
+    """Return the model with bodies fixed."""
     floors = {cavity.name: str(cavity.labels()[2]) for cavity in scene.cavity}
     return model.with_masses((floors[damper.cavity], damper.mass) for damper in scene.damper)
 
@@ -348,7 +348,7 @@ def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.n
     squares, shapes = spectrum(model.mass, model.stiffness)
     apart = list({_but_for_frequency(scene): scene for scene in scenes}.values())
     worst, met = 0.0, False
-    for scene in (apart[place] for place in np.unique(np.linspace(0, len(apart) - 1, _SCENES).astype(int))):
+    for scene in (apart[index] for index in np.unique(np.linspace(0, len(apart) - 1, _SCENES).astype(int))):
         smaller = _finest(scene, model)
         collisions = list(dict.fromkeys(_collisions(scene, smaller)))
         if not collisions:
@@ -366,7 +366,7 @@ def _sensitivity(scenes: Sequence[Scene], model: ReducedModel, frequencies: np.n
 
 
 def _but_for_frequency(scene: Scene) -> tuple[Any, ...]:
-    """Return what distinguishes scenes of one model, other than their frequency."""
+    """Return the key of scenes of one model, other than their frequency."""
     drive = replace(scene.excitation, frequency=1.0, engine_order=None)
     return (drive, scene.cavity, scene.damper, scene.friction_damper, scene.gravity, scene.contact)
 
@@ -402,15 +402,15 @@ def _collisions(scene: Scene, model: ReducedModel) -> list[WallContact]:
         return []
     first = spectrum(model.mass, model.stiffness)[1][:, 0]
     flexibility = model.residual_flexibility
-    own = np.zeros(len(model.interface)) if flexibility is None else np.diag(flexibility)
-    found = []
+    residual = np.zeros(len(model.interface)) if flexibility is None else np.diag(flexibility)
+    contacts = []
     for damper in scene.damper:
         for label in dict.fromkeys(filter(None, scene.cavity[scene.cavity_of(damper)].labels()[:2])):
             reduced = 1.0 / (1.0 / damper.mass + float(model.row(label) @ first) ** 2)
-            lost = float(own[model.interface.index(label)])
+            lost = float(residual[model.interface.index(label)])
             element = scene.contact.element(damper.restitution, reduced, lost)
-            found.append(WallContact(label, damper.mass, element.stiffness, element.dashpot))
-    return found
+            contacts.append(WallContact(label, damper.mass, element.stiffness, element.dashpot))
+    return contacts
 
 
 def _finest(scene: Scene, model: ReducedModel) -> ReducedModel:

@@ -1,6 +1,6 @@
 """The table of codes: numbers that stand for a meaning in compiled functions.
 
-Values are distinct wherever codes of several kinds share an array or an argument. All that functions are called with
+Values are distinct wherever codes of several kinds are in one array or an argument. All that functions are called with
 are numbers of numpy: numba compiles a function once for int64, but again for every literal and for every IntEnum, whose
 members it cannot add to a number.
 """
@@ -44,14 +44,14 @@ STATES_GO_ON, STATES_OPEN, NO_SOLUTION = range(30, 33)
 
 # why a compiled run returns: all periods are done, it needs something, it lets Python empty the log and see interrupts
 # (PAUSED), or it has ended (response.evaluation.STATUS_OF); of a run whose periods are done: whether it is not steady,
-# is to be made longer, or knows its mean too little (UNCERTAIN); OUTSIDE: a scene begins beyond a wall, and Python
+# is to be made longer, or its mean is too uncertain (UNCERTAIN); OUTSIDE: a scene begins beyond a wall, and Python
 # moves its bodies or refuses it; TRACED: a course is full, and Python reads it
 (
     DONE, NEEDS_FLOW, PAUSED, EVENT_BUDGET, ACCURACY_LOST, UNDECIDED, ILL_CONDITIONED, DIVERGED, PENETRATION,
     NOT_STEADY, LONGER, OUTSIDE, UNCERTAIN, TRACED,
 ) = range(40, 54)  # fmt: skip
 
-# counters of a run, of any method; BEGUN: whether the present segment of bodies in the plane,
+# counters of a run, of any method; BEGUN: whether the present segment of planar bodies,
 # or the present subsystem of sliders, has begun; ASLEEP: bodies
 (
     PERIOD, FLOW, SEARCHING, LOGGED, EVENTS, IMPACTS, EVALUATIONS, SEGMENTS, ACTIVE, CARRIED, CLOSED_ROWS, STEPS,

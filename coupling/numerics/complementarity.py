@@ -31,7 +31,7 @@ def solve_box(problem, k, scale):
     scale: size of the terms that b is the sum of, which sets the round-off.
     problem.forced: 0, or AT_LOW / AT_HIGH for a row whose force has just reached that bound on its way out: it stays
     there unless its acceleration then contradicts (forced becomes 0). Rows found at a bound without acceleration are
-    marked in the same way.
+    marked likewise.
     DEPENDENT rows are at rest because FREE rows hold them; their force keeps a value within its bounds.
     Returns False if the budget of pivots is spent (a safeguard: positive semidefinite problems end).
     """
@@ -41,7 +41,7 @@ def solve_box(problem, k, scale):
         if state[i] == OUT and not _drive(problem, k, i, tolerance):
             return False
     for i in range(k):
-        # a row forced to its bound stays there only as long as its acceleration agrees
+        # a row forced to its bound stays there only while its acceleration agrees
         if forced[i] != 0 and _leaves(state[i], a[i], tolerance):
             forced[i], state[i] = 0, OUT
             if not _drive(problem, k, i, tolerance):
@@ -114,7 +114,7 @@ def _drive(problem, k, i, tolerance):
 
 @kernel
 def _drive_only(problem, tolerance):
-    """Move the force of the only row until it obeys its condition: what `_drive` finds, without its equations."""
+    """Move the force of the only row until it obeys its condition, as `_drive` does, without its equations."""
     f, a, inverse_mass = problem.force[0], problem.acceleration[0], problem.matrix[0, 0]
     way = 1.0 if a < 0.0 else -1.0
     bound = problem.high[0] if way > 0.0 else problem.low[0]

@@ -1,7 +1,7 @@
 """Exponentials without cancellation: exp(z) - 1, exp(z) - 1 - z, and the growth of a driven mode.
 
 They have no branch and call nothing, so that a loop over modes takes several at once. Polynomials of sine and cosine:
-fdlibm (Sun Microsystems, 1993); what the reductions leave out is below the round-off of z itself.
+fdlibm (Sun Microsystems, 1993); the reductions' error is below the round-off of z itself.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def is_long(eigenvalue, harmonics, count, t):
 
 @inlined
 def whole_vectors(count, length):
-    """Return the count of modes rounded up to whole vectors, within the arrays' length: what is there is zero.
+    """Return the count of modes rounded up to whole vectors, within the arrays' length; the rest is zero.
 
     Turns that fill no vector are made one by one, and take as long as many vectors. Few modes stay few.
     """

@@ -55,7 +55,7 @@ def solve_lemke(problem, k, first):
 
 @kernel
 def _solve(problem, k, attempt, grown):
-    """Solve the problem by one covering vector: that of ones, or another one for later attempts.
+    """Solve the problem by one covering vector: of ones, or another for later attempts.
 
     grown: round-off relative to the largest entry so far, in addition to PIVOT.
     """
@@ -104,7 +104,7 @@ def _fill_tableau(problem, k, attempt):
 
 @kernel
 def _pivot(t, leaving, entering, k):
-    """Bring a column into the basis in place of that of a row."""
+    """Bring a column into the basis instead of that of a row."""
     pivot = t[leaving, entering]
     for j in range(2 * k + 2):
         t[leaving, j] /= pivot
@@ -138,9 +138,9 @@ def _fits(problem, k):
     for i in range(k):
         error, size = problem.q[i] - problem.w[i], abs(problem.q[i]) + abs(problem.w[i])
         for j in range(k):
-            part = problem.matrix[i, j] * problem.z[j]
-            error += part
-            size += abs(part)
+            term = problem.matrix[i, j] * problem.z[j]
+            error += term
+            size += abs(term)
         if abs(error) > max(RESIDUAL * max(size, 1.0), RESIDUAL_LARGEST * largest):
             return False
     return True

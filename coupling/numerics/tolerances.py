@@ -1,4 +1,4 @@
-"""Tolerances that several layers share. Every comment says what the number is multiplied by, and what follows below.
+"""Tolerances of several layers. Comments say what each multiplies, and what follows below.
 
 Those of one engine only are in line.tolerances and plane.tolerances. Values are factors unless a unit is given.
 """

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import svd
 
-from vanedamp.coupling.orbits.curve import Point, located
+from vanedamp.coupling.orbits.curve import CurvePoint, located
 from vanedamp.coupling.orbits.multipliers import decided, indicators
-from vanedamp.coupling.orbits.newton import Orbit, with_symmetry
+from vanedamp.coupling.orbits.newton import PeriodicOrbit, with_symmetry
 
 #: distance of a pair's imaginary part from zero, of its modulus from 1
 _PAIR = 1e-4
@@ -23,23 +23,23 @@ SWITCHES = ("period doubling", "pitchfork")
 
 
 class Located(NamedTuple):
-    """A special point of a branch, its kind, and what happens."""
+    """A special point of a branch, its kind and description."""
 
-    point: Point
+    point: CurvePoint
     kind: str
     note: str
 
 
-def bifurcations(before: Point, after: Point) -> Iterator[Located]:
+def bifurcations(before: CurvePoint, after: CurvePoint) -> Iterator[Located]:
     """Yield the bifurcations between two points whose orbits have one sequence of events, in order of arclength."""
     neutral = before.orbit.neutral
     if neutral != after.orbit.neutral:
         return
 
-    found = located(before, after, partial(_tests, neutral))
+    zeros = located(before, after, partial(_tests, neutral))
     length = abs(float((after.y - before.y) @ before.tangent))
-    meeting = [at for at, kind, _ in found if kind == "pitchfork"]
-    for at, kind, point in found:
+    meeting = [at for at, kind, _ in zeros if kind == "pitchfork"]
+    for at, kind, point in zeros:
         if kind == "fold" and any(abs(at - other) < _SAME * length for other in meeting):
             continue  # a branch that goes back on its mirror image
         note = ""
@@ -49,23 +49,23 @@ def bifurcations(before: Point, after: Point) -> Iterator[Located]:
             yield Located(point, kind, note)
 
 
-def leaps(before: Point, after: Point) -> bool:
+def leaps(before: CurvePoint, after: CurvePoint) -> bool:
     """Say whether a step between two orbits of one sequence leads from one sheet of a fold to the other.
 
-    A multiplier passes 1 then while the branch goes on the same way, but at no orbit between them.
+    A multiplier passes 1 then while the branch continues the same way, but at no orbit between them.
     """
     neutral = before.orbit.neutral
     if neutral != after.orbit.neutral:
         return False
 
-    def meets(point: Point) -> Mapping[str, float]:
+    def meets(point: CurvePoint) -> Mapping[str, float]:
         return {"pitchfork": _tests(neutral, point)["pitchfork"]}
 
     low, high = meets(before)["pitchfork"], meets(after)["pitchfork"]
     return low * high < 0.0 and not located(before, after, meets)
 
 
-def _tests(neutral: int, point: Point) -> dict[str, float]:
+def _tests(neutral: int, point: CurvePoint) -> dict[str, float]:
     """Return the test functions of bifurcations at a point.
 
     Neutral multipliers are as many as on the piece, since at its end one more may be 1. At a pitchfork one passes 1
@@ -78,7 +78,7 @@ def _tests(neutral: int, point: Point) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _on_circle(orbit: Orbit, neutral: int) -> bool:
+def _on_circle(orbit: PeriodicOrbit, neutral: int) -> bool:
     """Say whether a complex pair lies on the unit circle, rather than two real multipliers with the product 1."""
     values = decided(orbit.multipliers, neutral)
     return bool(np.any((np.abs(values.imag) > _PAIR) & (np.abs(np.abs(values) - 1.0) < _PAIR)))

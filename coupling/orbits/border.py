@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 
-from vanedamp.coupling.quantities.quantity import Measured, table
+from vanedamp.coupling.quantities.quantity import QuantityRecord, table
 from vanedamp.files.record import Array, NamedArrays, NumberUnit, RecordRows, declared, joined
 from vanedamp.files.store import frozen
 
@@ -30,7 +30,7 @@ class NamedPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve(Measured):
+class OrbitCurve(QuantityRecord):
     """A curve of m orbits with states of k coordinates, in order. All their quantities (results.md) are attributes."""
 
     periods: int
@@ -87,7 +87,7 @@ class BorderPoint(NamedPoint):
 
 
 @dataclass(frozen=True, eq=False)
-class Border(Curve):
+class Border(OrbitCurve):
     """A border: special points of branches over the branches' number and a second one.
 
     Its orbits have no exponents, of which one is zero.

@@ -10,7 +10,7 @@ import numpy as np
 from vanedamp.coupling.derivatives.passage import Passage, change
 from vanedamp.coupling.orbits.border import BorderPoint
 from vanedamp.coupling.orbits.conditions import Condition, Counts
-from vanedamp.coupling.orbits.curve import Path, Point, beginning, located, near, regular
+from vanedamp.coupling.orbits.curve import CurvePoint, Path, beginning, located, near, regular
 from vanedamp.coupling.orbits.multipliers import multipliers
 from vanedamp.coupling.scene.orbit import Orbit as Table
 
@@ -28,28 +28,28 @@ class BorderPath(Path):
     named = BorderPoint
     edge, closed = "the end of a number's range", "closed: back at its first point"
 
-    def __init__(self, table: Table, head: Point, most: int, own: float) -> None:
+    def __init__(self, table: Table, head: CurvePoint, most: int, own: float) -> None:
         super().__init__(table, head, most)
         self.own, self.visits = own, list[np.ndarray]()
 
-    def _kept(self, point: Point) -> dict[str, Any]:
-        problem, counts, found = self.problem, _counts(point), multipliers(point.orbit.derivative)[0]
+    def _kept(self, point: CurvePoint) -> dict[str, Any]:
+        problem, counts, values = self.problem, _counts(point), multipliers(point.orbit.derivative)[0]
         parameter, second = problem.numbers(point.exact)
         return {
             "parameter": parameter, "second": second, "state": problem.state(point.exact),
-            "multipliers": found**2 if problem.mirrored else found, "orbits": counts.orbits,
+            "multipliers": values**2 if problem.mirrored else values, "orbits": counts.orbits,
             "stable_orbits": counts.stable, "quantities": problem.at(point.y).quantities(problem.state(point.y)),
         }  # fmt: skip
 
     @staticmethod
-    def _tests(point: Point) -> Mapping[str, float]:
-        """Return the test functions of a point: those of its condition, and the rate of the second number."""
+    def _tests(point: CurvePoint) -> Mapping[str, float]:
+        """Return the test functions of a point: its condition's, and the rate of the second number."""
         return {**_condition(point).tests(point.y, point.passage), "extremum": float(point.tangent[-1])}
 
-    def _passed(self, before: Point, point: Point) -> Point:
-        found = located(before, point, self._tests)
-        names = {name for _, name, _ in found}
-        for _, name, at in found:
+    def _passed(self, before: CurvePoint, point: CurvePoint) -> CurvePoint:
+        zeros = located(before, point, self._tests)
+        names = {name for _, name, _ in zeros}
+        for _, name, at in zeros:
             if name == "extremum" and "cusp" in names:
                 continue  # both numbers turn back at a cusp
             self._note(at, name, "")
@@ -65,21 +65,21 @@ class BorderPath(Path):
                 self.visits.append(met.exact)
         return point
 
-    def _ending(self, before: Point, point: Point) -> str:
+    def _ending(self, before: CurvePoint, point: CurvePoint) -> str:
         if (why := self._steep(point)) is None:
             return super()._ending(before, point)
         self._note(point, f"{_condition(point).kind}-grazing", why)
         return why
 
-    def _steep(self, point: Point) -> str | None:
-        """Say which event comes to graze where motions part fast next to a point; None where they do not."""
+    def _steep(self, point: CurvePoint) -> str | None:
+        """Say which event comes to graze where motions part fast near a point; None without."""
         parts = np.abs(point.orbit.derivative).max() ** (2 if self.problem.mirrored else 1)
         slowest = min(point.passage.crossings, key=lambda crossing: abs(crossing.speed), default=None)
         if parts < _STEEP or slowest is None:
             return None
         return f"{slowest.name} nearly grazes: motions part by {parts:.0e} per passage"
 
-    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
+    def _cross(self, step: float, last: CurvePoint, beyond: CurvePoint | None, lost: bool) -> None:
         if last is not self.head and regular(last) is not None:
             self._onward(self._passed(self.head, last))
             if self.end:
@@ -87,8 +87,8 @@ class BorderPath(Path):
         head, after = self.head, None
         for start, passage in self._beyond(head):
             after = after or passage
-            beside = regular(beginning(self.problem, start, head.tangent, head.condition))
-            point = beside and regular(near(beside, start, head.tangent, 2 * max(_BEYOND)))
+            guess = regular(beginning(self.problem, start, head.tangent, head.condition))
+            point = guess and regular(near(guess, start, head.tangent, 2 * max(_BEYOND)))
             if point is not None and point.passage.sequence != head.passage.sequence:
                 self._change(head, passage)
                 self.head, self.trail = point, []
@@ -100,14 +100,14 @@ class BorderPath(Path):
         else:
             self.end = f"{self._change(head, after)}; no such orbit found beyond"
 
-    def _change(self, head: Point, after: Passage | None) -> str:
+    def _change(self, head: CurvePoint, after: Passage | None) -> str:
         """Name a change of the sequence of events, and return what it is."""
         kind, note = change(head.passage, after)
         # grazing is of codimension two
         self._note(head, f"{_condition(head).kind}-grazing" if kind == "grazing" else kind, note)
         return note
 
-    def _beyond(self, head: Point) -> Iterator[tuple[np.ndarray, Passage]]:
+    def _beyond(self, head: CurvePoint) -> Iterator[tuple[np.ndarray, Passage]]:
         """Yield states of another sequence next to the last one, along the border, and where the state has jumped.
 
         It jumps where an event passes the start of the period; the state beyond is how a passage ends that begins next
@@ -131,13 +131,13 @@ class BorderPath(Path):
                     yield image, beyond
 
 
-def _condition(point: Point) -> Condition:
+def _condition(point: CurvePoint) -> Condition:
     """Return the condition that a border's point has."""
     assert point.condition is not None
     return point.condition
 
 
-def _counts(point: Point) -> Counts:
+def _counts(point: CurvePoint) -> Counts:
     """Return the orbits on both sides of a point, at smaller and larger values of the first number."""
     problem = point.problem
     way = np.sign(problem.span[0])

@@ -12,11 +12,11 @@ import numpy as np
 from vanedamp.coupling.orbits.border import Border
 from vanedamp.coupling.orbits.border_path import BorderPath
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
-from vanedamp.coupling.orbits.conditions import Clearance, Condition, Pair, Peak, Singular
-from vanedamp.coupling.orbits.curve import Point, beginning, near, regular
+from vanedamp.coupling.orbits.conditions import Clearance, Condition, MultiplierPair, Peak, Singular
+from vanedamp.coupling.orbits.curve import CurvePoint, beginning, near, regular
 from vanedamp.coupling.orbits.multipliers import decided, multipliers
 from vanedamp.coupling.orbits.period_map import PeriodMap
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 from vanedamp.coupling.scene.orbit import Orbit as Table
 
 #: scaled distance of special points that lie on one border, and of a border's point from the special point it begins at
@@ -36,11 +36,11 @@ class _Candidate(NamedTuple):
     kind: str
     point: int
     parameter: float
-    begin: Callable[[], Point | None]
+    begin: Callable[[], CurvePoint | None]
 
 
 class Borders:
-    """The borders of some branches, found one after the other.
+    """The borders of some branches, found in turn.
 
     period_map: of one excitation period, or of waves; table: with the second number; origin, span: (2,) values of the
     two numbers at which the scaled ones are 0, and their ranges; second: its value on the branches; notes: what could
@@ -63,11 +63,11 @@ class Borders:
         return float((self.second - self.origin[1]) / self.span[1])
 
     def resume(self, borders: Sequence[Border]) -> None:
-        """Take up what an interrupted search has finished."""
+        """Resume from an interrupted search."""
         self.finished = list(borders)
 
     def follow(self, branches: Sequence[Branch], changed: Callable[[int, int], None]) -> None:
-        """Find all borders; changed: called with the number of points found and of those that there may be."""
+        """Find all borders; changed: called with points found and possible."""
         for number, branch in enumerate(branches):
             for kind, at, parameter, begin in self._candidates(branch):
                 source = (number, at)
@@ -87,7 +87,7 @@ class Borders:
         return any((kind, periods) == (other, of) and np.abs(y - at).max() < _SAME for other, of, at in self._visited)
 
     def _follow(
-        self, kind: str, periods: int, source: tuple[int, int], first: Point, changed: Callable[[int, int], None]
+        self, kind: str, periods: int, source: tuple[int, int], first: CurvePoint, changed: Callable[[int, int], None]
     ) -> None:
         """Follow a border both ways from a point, as far as the ranges of the numbers allow."""
         paths: list[BorderPath] = []
@@ -122,18 +122,18 @@ class Borders:
                 if a[i - 1] < a[i] >= a[i + 1] and sequence[i - 1] == sequence[i] == sequence[i + 1]:
                     yield _Candidate("peak", -1 - i, float(branch.parameter[i]), partial(self._peak, branch, i))
 
-    def _problem(self, branch: Branch, index: int, mirrored: bool = False) -> Problem:
+    def _problem(self, branch: Branch, index: int, mirrored: bool = False) -> OrbitProblem:
         """Return the problem of orbits around a regular one of a branch."""
         paths, along = (self.table.parameter, self.track.parameter), self.map.over(branch.periods)
         along = replace(along, wave=along.wave and not mirrored)
-        problem = Problem(along, paths, self.origin, self.span, mirrored)
+        problem = OrbitProblem(along, paths, self.origin, self.span, mirrored)
         passage = problem.passage(self._orbit(problem, branch, index))
         return problem if passage is None or mirrored else problem.anchored(passage)
 
-    def _orbit(self, problem: Problem, branch: Branch, index: int) -> np.ndarray:
+    def _orbit(self, problem: OrbitProblem, branch: Branch, index: int) -> np.ndarray:
         return problem.pack(branch.state[index], float(branch.parameter[index]), self.second)
 
-    def _smooth(self, branch: Branch, point: SpecialPoint) -> Point | None:
+    def _smooth(self, branch: Branch, point: SpecialPoint) -> CurvePoint | None:
         """Return the first point of a fold, pitchfork, doubling or Neimark-Sacker border."""
         symmetric, neutral = bool(branch.symmetric[point.index]), int(branch.neutral[point.index])
         mirrored = point.kind == "pitchfork" or (point.kind == "fold" and symmetric and not self.map.wave)
@@ -146,12 +146,14 @@ class Borders:
         if point.kind == "neimark-sacker":
             values = decided(multipliers(problem.derivative(passage))[0], neutral)
             turning = values[np.abs(values.imag) > 0.0]
-            condition = Pair(problem, neutral, 2 * float(turning[np.argmin(np.abs(np.abs(turning) - 1.0))].real))
+            condition = MultiplierPair(
+                problem, neutral, 2 * float(turning[np.argmin(np.abs(np.abs(turning) - 1.0))].real)
+            )
         else:
             condition = Singular.of(problem, point.kind, neutral, passage)
         return first_point(condition, y)
 
-    def _clear(self, branch: Branch, point: SpecialPoint) -> Point | None:
+    def _clear(self, branch: Branch, point: SpecialPoint) -> CurvePoint | None:
         """Return the first point of a border where an event grazes, from orbits without it.
 
         None if they may be moved: where a body may rest anywhere, that decides how near it comes.
@@ -173,20 +175,20 @@ class Borders:
                     return first
         return None
 
-    def _peak(self, branch: Branch, index: int) -> Point | None:
+    def _peak(self, branch: Branch, index: int) -> CurvePoint | None:
         """Return the first point of a peak next to the largest of a branch's orbits."""
         if self.map.wave and branch.neutral[index]:
-            return None  # in a part, a body that may be moved takes the place of another one
+            return None  # in a part, a body that may be moved replaces another
         problem = self._problem(branch, index)
         y, before, after = (self._orbit(problem, branch, i) for i in (index, index - 1, index + 1))
         return first_point(Peak(problem, int(branch.neutral[index]), (after - before)[:-1]), y)
 
 
-def first_point(condition: Condition, y: np.ndarray) -> Point | None:
-    """Return the point of a border near y (k + 2,) at its second number; None if there is none."""
+def first_point(condition: Condition, y: np.ndarray) -> CurvePoint | None:
+    """Return the point of a border near y (k + 2,) at its second number; None without."""
     row = condition.problem.row()
-    beside = regular(beginning(condition.problem, y, row, condition))
-    return beside and regular(near(beside, y, row, 1.0))
+    guess = regular(beginning(condition.problem, y, row, condition))
+    return guess and regular(near(guess, y, row, 1.0))
 
 
 def _border(kind: str, periods: int, source: tuple[int, int], paths: Sequence[BorderPath]) -> Border:

@@ -9,10 +9,10 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.orbits.border import Border, Curve, NamedPoint
+from vanedamp.coupling.orbits.border import Border, NamedPoint, OrbitCurve
 from vanedamp.coupling.orbits.orbit_quantities import LEAVES
 from vanedamp.coupling.quantities import stress as of_stress
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
+from vanedamp.coupling.quantities.quantity import Quantity, QuantityRecord, labels_along, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Plotted
@@ -24,7 +24,7 @@ class SpecialPoint(NamedPoint):
 
 
 @dataclass(frozen=True, eq=False)
-class Branch(Curve):
+class Branch(OrbitCurve):
     """A branch of orbits, in the order in which it was followed."""
 
     neutral: Annotated[np.ndarray, Array(("point",), dtype=int)]
@@ -69,10 +69,10 @@ def unknown(branch: Branch) -> str:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branches(Measured, Record, Plotted):
+class Branches(QuantityRecord, Record, Plotted):
     """Branches of periodic orbits of a scene over one of its numbers.
 
-    All quantities are attributes, arrays over the points of all branches one after the other.
+    All quantities are attributes, arrays over the points of all branches in turn.
     """
 
     KIND: ClassVar[str] = "orbits"
@@ -96,9 +96,9 @@ class Branches(Measured, Record, Plotted):
 
     @cached_property
     def quantities(self) -> Mapping[str, np.ndarray]:  # type: ignore[override]
-        """Quantities by name, of the points of all branches one after the other."""
-        own = self.branches
-        return joined([branch.quantities for branch in own], [len(branch.parameter) for branch in own])
+        """Quantities by name, of the points of all branches in turn."""
+        branches = self.branches
+        return joined([branch.quantities for branch in branches], [len(branch.parameter) for branch in branches])
 
     @property
     def second(self) -> str:
@@ -118,7 +118,7 @@ class Branches(Measured, Record, Plotted):
         return {name: one for name, one in table().items() if name in self.quantities and not (one.dims or one.text)}
 
     def unit_in_file(self, declared: str) -> str:
-        """Return the unit of a declared field, of which some stand for that of a number."""
+        """Return the unit of a declared field, perhaps a number's."""
         paths = {"parameter": self.parameter, "second": self.second}
         return unit_of(paths[declared]) if declared in paths else declared
 
@@ -148,7 +148,7 @@ class Branches(Measured, Record, Plotted):
         }  # fmt: skip
 
     @staticmethod
-    def _ends(parts: Sequence[Curve], name: str) -> list[dict[str, Any]]:
+    def _ends(parts: Sequence[OrbitCurve], name: str) -> list[dict[str, Any]]:
         """Return the least and largest value of a quantity of each branch or border, of bodies and spots one each."""
         known = [part.quantities[name] for part in parts if name in part.quantities]
         ends = [{"min": np.fmin.reduce(values), "max": np.fmax.reduce(values)} for values in known]

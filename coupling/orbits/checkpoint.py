@@ -14,8 +14,8 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.files.store import Variable
 
 
-class Checkpoint(SceneCheckpoint):
-    """What was found so far, in a file (path None: nowhere).
+class BranchCheckpoint(SceneCheckpoint):
+    """Results so far, in a file (path None: nowhere).
 
     found: branches, whose last one is unfinished if its end is ""; head, step: where it continues (Diagram.place);
     current: returns all three as they are now.
@@ -25,7 +25,7 @@ class Checkpoint(SceneCheckpoint):
         self, path: str | Path | None, scene: Scene, provenance: Mapping[str, Any],
         current: Callable[[], tuple[Branches, np.ndarray, float]],
     ) -> None:  # fmt: skip
-        """Take up what the file holds. Raises InputError for a file of other branches or an unreadable one."""
+        """Resume from the file. Raises InputError for a file of other branches or an unreadable one."""
         super().__init__(path, "orbits-checkpoint", scene, provenance)
         self._current = current
         self.found: Branches | None = None
@@ -37,8 +37,8 @@ class Checkpoint(SceneCheckpoint):
 
     def content(self) -> tuple[Mapping[str, Variable], dict[str, Any], str]:
         """Return variables and attributes of the file, and how many points are found, in words."""
-        found, head, step = self._current()
-        points = sum(len(branch.parameter) for branch in found.branches)
-        variables = found.variables() | {"head": Variable(head, ("head_row", "head_entry"))}
-        attributes = found.attributes() | {"step": step}
+        branches, head, step = self._current()
+        points = sum(len(branch.parameter) for branch in branches.branches)
+        variables = branches.variables() | {"head": Variable(head, ("head_row", "head_entry"))}
+        attributes = branches.attributes() | {"step": step}
         return variables, attributes, f"{points} points are found"

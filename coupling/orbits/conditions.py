@@ -17,7 +17,7 @@ from scipy.linalg import eigvals, solve, svd
 
 from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.multipliers import decided, indicators
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 
 #: clearance, relative to its scale, up to which an orbit is followed that does not graze yet: the border itself is
 #: extrapolated, which leaves its square
@@ -42,7 +42,7 @@ class Condition:
     step: of its differences; level: by which its zero is away from the border.
     """
 
-    problem: Problem
+    problem: OrbitProblem
     neutral: int
     kind: ClassVar[str]
     step: ClassVar[float] = _STEP
@@ -57,11 +57,11 @@ class Condition:
         return difference(self.problem, self.value, y, passage, direction, self.step)
 
     def renewed(self, y: np.ndarray, passage: Passage) -> Condition:
-        """Return the condition with what it refers to taken from a point of the border."""
+        """Return the condition with references taken from a point of the border."""
         return self
 
     def multipliers(self, passage: Passage) -> np.ndarray:
-        """Return the multipliers that are not known to have modulus 1."""
+        """Return the multipliers unknown to have modulus 1."""
         return decided(eigvals(self.problem.derivative(passage)), self.neutral)
 
     def tests(self, y: np.ndarray, passage: Passage) -> Mapping[str, float]:
@@ -91,16 +91,16 @@ class Singular(Condition):
     c: np.ndarray
 
     @classmethod
-    def of(cls, problem: Problem, kind: str, neutral: int, passage: Passage) -> Singular:
+    def of(cls, problem: OrbitProblem, kind: str, neutral: int, passage: Passage) -> Singular:
         """Return the condition by the singular vectors at a passage."""
         nothing = np.zeros(problem.size)
-        found = cls(problem, neutral, kind, nothing, nothing)
-        left, _, right = svd(found._matrix(passage))
-        return replace(found, b=left[:, -1], c=right[-1])
+        condition = cls(problem, neutral, kind, nothing, nothing)
+        left, _, right = svd(condition._matrix(passage))
+        return replace(condition, b=left[:, -1], c=right[-1])
 
     @property
     def unit(self) -> float:
-        """The multiplier, of a pitchfork that of the mirrored half period."""
+        """The multiplier, of a pitchfork over the mirrored half period."""
         return 1.0 if self.kind == "fold" else -1.0
 
     def _matrix(self, passage: Passage) -> np.ndarray:
@@ -109,7 +109,7 @@ class Singular(Condition):
         return self.problem.derivative(passage) + np.eye(self.problem.size)
 
     def _solved(self, passage: Passage) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return right and left null vectors (k,) and what is left of them."""
+        """Return right and left null vectors (k,) and their remainder."""
         size = self.problem.size
         matrix = np.zeros((size + 1, size + 1))
         matrix[:-1, :-1], matrix[:-1, -1], matrix[-1, :-1] = self._matrix(passage), self.b, self.c
@@ -165,12 +165,12 @@ class Singular(Condition):
         product, form = float(left @ right), self._normal_form(y, passage)
         if self.unit > 0:
             flip = "fold-pitchfork" if self.problem.mirrored else "fold-flip"
-            found = {"cusp": form, "1:1 resonance": product, flip: rest.doubling}
+            values = {"cusp": form, "1:1 resonance": product, flip: rest.doubling}
         elif self.problem.mirrored:
-            found = {"generalised pitchfork": form / product, "1:1 resonance": product, "fold-pitchfork": rest.unity}
+            values = {"generalised pitchfork": form / product, "1:1 resonance": product, "fold-pitchfork": rest.unity}
         else:
-            found = {"generalised doubling": form / product, "1:2 resonance": product, "fold-flip": rest.unity}
-        return found | {f"{self.kind}-Neimark-Sacker": rest.torus}
+            values = {"generalised doubling": form / product, "1:2 resonance": product, "fold-flip": rest.unity}
+        return values | {f"{self.kind}-Neimark-Sacker": rest.torus}
 
     def counts(self, passage: Passage, y: np.ndarray, rate: float, along: np.ndarray) -> Counts:
         """Return two orbits on one side of a fold; of the others those that bifurcate, too."""
@@ -191,7 +191,7 @@ class Singular(Condition):
 
 
 @dataclass(frozen=True, eq=False)
-class Pair(Condition):
+class MultiplierPair(Condition):
     """A pair of multipliers with the product 1; total: the sum of the pair that is meant, near the border."""
 
     kind = "neimark-sacker"
@@ -213,7 +213,7 @@ class Pair(Condition):
         """Return the product of the pair, less one."""
         return float(self._pair(passage)[0].real) - 1.0
 
-    def renewed(self, y: np.ndarray, passage: Passage) -> Pair:
+    def renewed(self, y: np.ndarray, passage: Passage) -> MultiplierPair:
         """Return the condition on the pair of a passage."""
         return replace(self, total=float(self._pair(passage)[1].real))
 
@@ -242,7 +242,7 @@ class Clearance(Condition):
     after: int | None = None
 
     @classmethod
-    def of(cls, problem: Problem, y: np.ndarray, passage: Passage) -> Clearance:
+    def of(cls, problem: OrbitProblem, y: np.ndarray, passage: Passage) -> Clearance:
         """Return the condition that nearly holds: of a clearance, or of the two events next to each other."""
         apart = np.diff(problem.at(y).times(passage))
         return cls(problem, 0, None if np.isfinite(passage.clearance[0]) or not len(apart) else int(apart.argmin()))
@@ -291,13 +291,13 @@ class Peak(Condition):
 
 
 def difference(
-    problem: Problem, function: Callable[[np.ndarray, Passage], float], y: np.ndarray, passage: Passage,
+    problem: OrbitProblem, function: Callable[[np.ndarray, Passage], float], y: np.ndarray, passage: Passage,
     direction: np.ndarray, step: float, derivative: bool = True,
 ) -> float:  # fmt: skip
     """Return the derivative of a function of y and its passage along a direction (k + 2,), by central differences.
 
     Steps shrink as long as the sequence of events is another one, or the function unknown, on a side; then one side
-    serves. nan where none does. derivative: whether the function needs that of passages.
+    serves. nan where none does. derivative: whether the function needs passages'.
     """
 
     def value(at: np.ndarray) -> float:

@@ -14,10 +14,10 @@ import numpy as np
 from vanedamp.coupling.derivatives.passage import change
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations, leaps
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
-from vanedamp.coupling.orbits.curve import Path, Point, beginning
-from vanedamp.coupling.orbits.newton import Orbit, with_symmetry
+from vanedamp.coupling.orbits.curve import CurvePoint, Path, beginning
+from vanedamp.coupling.orbits.newton import PeriodicOrbit, with_symmetry
 from vanedamp.coupling.orbits.other_side import CENTRED, OtherSide
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -25,20 +25,20 @@ from vanedamp.files.toml_input import InputError
 _SAME = 1e-4
 
 
-class Continuation(Path):
+class BranchPath(Path):
     """A branch while it is followed; source: the branch and the special point that it was switched from."""
 
     named = SpecialPoint
     edge, closed = "the end of the parameter's range", "closed: back at its first orbit"
 
-    def __init__(self, table: Table, head: Point, source: tuple[int, int] | None = None) -> None:
+    def __init__(self, table: Table, head: CurvePoint, source: tuple[int, int] | None = None) -> None:
         super().__init__(table, head, table.max_points)
         self.source, self._other_side = source, OtherSide(head.problem, table.step, table.min_step)
 
     @classmethod
     def resume(
-        cls, problem: Problem, table: Table, branch: Branch, head: np.ndarray, step: float
-    ) -> Continuation | None:
+        cls, problem: OrbitProblem, table: Table, branch: Branch, head: np.ndarray, step: float
+    ) -> BranchPath | None:
         """Return a branch that was interrupted, from where it continues (Diagram.place); None if that is no orbit."""
         if (last := beginning(problem, *head[:2])) is None:
             return None
@@ -57,32 +57,32 @@ class Continuation(Path):
             source_branch=branch, source_special=special,
         )  # fmt: skip
 
-    def _kept(self, point: Point) -> dict[str, Any]:
-        return kept(with_symmetry(point.orbit))
+    def _kept(self, point: CurvePoint) -> dict[str, Any]:
+        return data_of(with_symmetry(point.orbit))
 
-    def _end(self, why: str, point: Point) -> None:
+    def _end(self, why: str, point: CurvePoint) -> None:
         self._note(point, "end", why)
         super()._end(why, point)
 
-    def _leaps(self, before: Point, point: Point) -> bool:
+    def _leaps(self, before: CurvePoint, point: CurvePoint) -> bool:
         return leaps(before, point)
 
-    def _passed(self, before: Point, point: Point) -> Point | None:
+    def _passed(self, before: CurvePoint, point: CurvePoint) -> CurvePoint | None:
         return None if self._ends_on(bifurcations(before, point)) else point
 
     def _ends_on(self, located: Iterable[Located]) -> bool:
         """Note bifurcations on the way. Returns whether the branch has ended on one: joined another."""
-        for found in located:
+        for special in located:
             # where a branch meets its own mirror image it turns, so that it looks like a fold, too
-            turns = found.kind in ("fold", "pitchfork")
-            if turns and (why := self._joined(found.point.orbit)):
-                self._note(found.point, "pitchfork", "branches meet")
-                self._end(why, found.point)
+            turns = special.kind in ("fold", "pitchfork")
+            if turns and (why := self._joined(special.point.orbit)):
+                self._note(special.point, "pitchfork", "branches meet")
+                self._end(why, special.point)
                 return True
-            self._note(*found)
+            self._note(*special)
         return False
 
-    def _joined(self, orbit: Orbit) -> str:
+    def _joined(self, orbit: PeriodicOrbit) -> str:
         """Say on which branch of more symmetric orbits this one ends; "" if it does not."""
         if not self.points[-1]["symmetric"] and with_symmetry(orbit).symmetric:
             return "joins a branch of symmetric orbits"
@@ -93,7 +93,7 @@ class Continuation(Path):
 
     # -- changes of the event sequence
 
-    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
+    def _cross(self, step: float, last: CurvePoint, beyond: CurvePoint | None, lost: bool) -> None:
         if last is not self.head and self._passed(self.head, last) is None:
             return
         point = beyond
@@ -110,15 +110,15 @@ class Continuation(Path):
         if point is not None and passed is None and point.tangent[-1] * last.tangent[-1] < 0:
             how += ": the branch turns"
         after = self._other_side.passage(last) if point is None or how == CENTRED else point.passage
-        kind, what = change(last.passage, after)
-        self._note(last, kind, f"{what}{how}")
+        kind, words = change(last.passage, after)
+        self._note(last, kind, f"{words}{how}")
         if point is None:
-            self._end(self._refusal(last, step) or f"{what}; no orbit found beyond", last)
+            self._end(self._refusal(last, step) or f"{words}; no orbit found beyond", last)
         elif passed is None or not self._ends_on(passed[1]):
             self._add(last if passed is None else point, point)  # at the start of the period the state jumps
             self.step = max(self.table.step / 8, self.table.min_step)
 
-    def _refusal(self, last: Point, step: float) -> str:
+    def _refusal(self, last: CurvePoint, step: float) -> str:
         """Say why values of the parameter beyond a point make no scene; "" if they do."""
         try:
             self.problem.at(last.y + step * last.tangent)
@@ -127,13 +127,13 @@ class Continuation(Path):
         return ""
 
 
-def kept(orbit: Orbit) -> dict[str, Any]:
-    """Return what a branch keeps of an orbit."""
+def data_of(orbit: PeriodicOrbit) -> dict[str, Any]:
+    """Return a branch's data of an orbit."""
     names = ("parameter", "state", "multipliers", "neutral", "stable", "symmetric", "undetermined", "quantities")
     return {name: getattr(orbit, name) for name in names} | {"sequence": "; ".join(orbit.passage.sequence)}
 
 
-def _repeats(orbit: Orbit) -> bool:
+def _repeats(orbit: PeriodicOrbit) -> bool:
     """Say whether an orbit repeats after half of its periods."""
     assert orbit.map is not None
     passage = orbit.map.over(orbit.periods // 2)(orbit.state, False)

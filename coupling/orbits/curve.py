@@ -20,8 +20,8 @@ from scipy.optimize import brentq
 
 from vanedamp.coupling.derivatives.passage import Passage, forecast
 from vanedamp.coupling.orbits.conditions import Condition
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus, Zero, least_squares, solve
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.newton import OrbitStatus, PeriodicOrbit, Zero, least_squares, solve
+from vanedamp.coupling.orbits.problem import OrbitProblem
 from vanedamp.coupling.orbits.waves import whole
 from vanedamp.coupling.scene.orbit import Orbit as Table
 
@@ -32,26 +32,26 @@ _EFFORT = ((8, 3, 3), (16, 10, 9))
 _STRAIGHT, _BENT = 0.985, 0.9
 #: distance from the tangent, relative to the step, up to which steps grow where they are predicted on a curve
 _NEAR = 0.01
-#: share of the numbers in a tangent below which it is at a turn of both; from which on it is away from folds
+#: fraction of the numbers in a tangent below which it is at a turn of both; from which on it is away from folds
 _FLAT, _STEEP = 0.05, 0.2
 #: distances by which a prediction is moved to where the sequence of events is still that of the condition
 _LIFTS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 #: relative error of numbers where an event is, or the sequence changes; and scaled one of a range's end
 _CLOSE, _EDGE = 1e-10, 1e-9
-#: attempts at the place of a change of sequence, at least every third one a bisection
+#: attempts at a change of sequence, at least every third one a bisection
 _ATTEMPTS = 120
 #: a test function that is larger than this fraction of its ends' at its root has jumped there, and has no zero
 _ZERO = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class CurvePoint:
     """A point of a curve: a zero of a problem, and of the condition that a curve over two numbers has.
 
     zero: the orbit; row: (k + m,) direction in which the curve is followed; given: the condition, of the point before.
     """
 
-    problem: Problem
+    problem: OrbitProblem
     zero: Zero
     row: np.ndarray
     given: Condition | None = None
@@ -68,11 +68,11 @@ class Point:
 
     @cached_property
     def condition(self) -> Condition | None:
-        """The condition with what it refers to taken from here."""
+        """The condition with references taken from here."""
         return None if self.given is None else self.given.renewed(self.y, self.passage)
 
     @cached_property
-    def orbit(self) -> Orbit:
+    def orbit(self) -> PeriodicOrbit:
         """The record of its orbit."""
         orbit = self.zero.orbit(self.problem)
         return whole(orbit) if self.problem.map.wave else orbit
@@ -91,8 +91,8 @@ class Point:
         if not np.isfinite(derivative).all():
             return np.full(len(self.y), np.nan)
         plane = svd(derivative)[2][-2:]
-        found = plane.T @ [condition.slope(self.y, self.passage, direction) for direction in plane]
-        return found if found.any() else np.full(len(found), np.nan)
+        slopes = plane.T @ [condition.slope(self.y, self.passage, direction) for direction in plane]
+        return slopes if slopes.any() else np.full(len(slopes), np.nan)
 
     @cached_property
     def slopes(self) -> np.ndarray:
@@ -120,7 +120,7 @@ class Point:
         return np.asarray(self.y - self.condition.level * self.gradient / (self.gradient @ self.gradient))
 
 
-def near(head: Point, predicted: np.ndarray, row: np.ndarray, distance: float = np.inf) -> Point | None:
+def near(head: CurvePoint, predicted: np.ndarray, row: np.ndarray, distance: float = np.inf) -> CurvePoint | None:
     """Return the point of a head's curve in the plane through `predicted` (k + m,) normal to `row` (k + m,).
 
     None if there is none within a distance. Without a condition it may have another sequence of events.
@@ -145,23 +145,25 @@ def near(head: Point, predicted: np.ndarray, row: np.ndarray, distance: float = 
         zero = solve(problem, start, row, slopes, iterations, halvings, float(row @ predicted), function)
         problem.count["iterations"] += zero.iterations
         if zero.status is OrbitStatus.OK:
-            return Point(problem, zero, row, condition) if np.linalg.norm(zero.y - predicted) <= distance else None
+            return CurvePoint(problem, zero, row, condition) if np.linalg.norm(zero.y - predicted) <= distance else None
         # the slopes there, if the head's do not serve
-        if condition is not None or (beside := beginning(problem, predicted, row)) is None:
+        if condition is not None or (guess := beginning(problem, predicted, row)) is None:
             return None
-        if np.array_equal(beside.columns, head.columns):
+        if np.array_equal(guess.columns, head.columns):
             return None
-        slopes = beside.slopes
+        slopes = guess.slopes
     return None
 
 
-def beginning(problem: Problem, y: np.ndarray, row: np.ndarray, condition: Condition | None = None) -> Point | None:
-    """Return a point from whose slopes a zero near it may be found; None if y has no passage."""
+def beginning(
+    problem: OrbitProblem, y: np.ndarray, row: np.ndarray, condition: Condition | None = None
+) -> CurvePoint | None:
+    """Return a point from whose slopes a zero near it may be found; None without a passage."""
     passage = problem.passage(y)
-    return None if passage is None else Point(problem, Zero(OrbitStatus.OK, y, passage, np.nan, 0), row, condition)
+    return None if passage is None else CurvePoint(problem, Zero(OrbitStatus.OK, y, passage, np.nan, 0), row, condition)
 
 
-def predicted(head: Point, at: float, known: Sequence[np.ndarray] = ()) -> np.ndarray:
+def predicted(head: CurvePoint, at: float, known: Sequence[np.ndarray] = ()) -> np.ndarray:
     """Return where a curve is expected (k + m,) at a distance along the tangent.
 
     That is on the tangent, or on the curve of least order that has it and passes the two nearest of some known points
@@ -169,19 +171,19 @@ def predicted(head: Point, at: float, known: Sequence[np.ndarray] = ()) -> np.nd
     own sequence is another: there the tangent serves for steps of v^1.5 only.
     """
     places = {float((y - head.y) @ head.tangent): y for y in known}
-    nearest = sorted(places.keys() - {0.0}, key=lambda place: abs(place - at))[:2]
-    curve = KroghInterpolator([0.0, 0.0, *nearest], [head.y, head.tangent, *(places[place] for place in nearest)])
+    nearest = sorted(places.keys() - {0.0}, key=lambda t: abs(t - at))[:2]
+    curve = KroghInterpolator([0.0, 0.0, *nearest], [head.y, head.tangent, *(places[t] for t in nearest)])
     return np.asarray(curve(at))
 
 
 def corrected(
-    head: Point, step: float, known: Sequence[np.ndarray] = (), row: np.ndarray | None = None
-) -> Point | None:
-    """Return the point in a plane, by default normal to the tangent, at a distance along it; None if there is none."""
+    head: CurvePoint, step: float, known: Sequence[np.ndarray] = (), row: np.ndarray | None = None
+) -> CurvePoint | None:
+    """Return the point in a plane, by default normal to the tangent, at a distance along it; None without."""
     return near(head, predicted(head, step, known), head.tangent if row is None else row, abs(step))
 
 
-def _row(head: Point) -> np.ndarray:
+def _row(head: CurvePoint) -> np.ndarray:
     """Return the normal (k + m,) of the plane in which the next point is sought.
 
     Away from folds of a curve over one number that is its own: Newton's method then stays in one scene.
@@ -191,8 +193,8 @@ def _row(head: Point) -> np.ndarray:
     return np.copysign(1.0, head.tangent[-1]) * head.problem.row()
 
 
-def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point | None:
-    """Return the point at an arclength from another, at most at the ends of the ranges; None if there is none.
+def reached(head: CurvePoint, step: float, known: Sequence[np.ndarray] = ()) -> CurvePoint | None:
+    """Return the point at an arclength from another, at most at the ends of the ranges; None without.
 
     known: points (k + m,) from which it is predicted; where they lead to none of its sequence the tangent may.
     """
@@ -216,34 +218,36 @@ def reached(head: Point, step: float, known: Sequence[np.ndarray] = ()) -> Point
     return regular(point)
 
 
-def regular(point: Point | None) -> Point | None:
+def regular(point: CurvePoint | None) -> CurvePoint | None:
     """Return a point if its tangent is known, else None."""
     return point if point is not None and np.isfinite(point.tangent).all() else None
 
 
 def located(
-    before: Point, after: Point, tests: Callable[[Point], Mapping[str, float]]
-) -> list[tuple[float, str, Point]]:
+    before: CurvePoint, after: CurvePoint, tests: Callable[[CurvePoint], Mapping[str, float]]
+) -> list[tuple[float, str, CurvePoint]]:
     """Return arclengths, names and points of zeros of test functions between two points, in order."""
-    low, high, found = tests(before), tests(after), list[tuple[float, str, Point]]()
+    low, high, zeros = tests(before), tests(after), list[tuple[float, str, CurvePoint]]()
     for name in [name for name in low if low[name] * high[name] < 0.0]:
 
-        def function(point: Point, name: str = name) -> float:
+        def function(point: CurvePoint, name: str = name) -> float:
             return tests(point)[name]
 
         if (zero := _root(before, after, function, max(abs(low[name]), abs(high[name])))) is not None:
-            found.append((zero[0], name, zero[1]))
-    return sorted(found, key=lambda entry: entry[0])
+            zeros.append((zero[0], name, zero[1]))
+    return sorted(zeros, key=lambda entry: entry[0])
 
 
-def _root(before: Point, after: Point, function: Callable[[Point], float], size: float) -> tuple[float, Point] | None:
+def _root(
+    before: CurvePoint, after: CurvePoint, function: Callable[[CurvePoint], float], size: float
+) -> tuple[float, CurvePoint] | None:
     """Return arclength and point of a test function's zero between two points; None if it jumps.
 
     Points are predicted from those that are known: near a pitchfork Newton's method, whose derivative is singular
     there, has only a small part of its way left for it. Where even that is too much, a branch's zero is the chord's.
     """
     length = float((after.y - before.y) @ before.tangent)
-    points: dict[float, Point] = {0.0: before, length: after}
+    points: dict[float, CurvePoint] = {0.0: before, length: after}
 
     def value(at: float) -> float:
         if at not in points:
@@ -269,7 +273,7 @@ class _Lost(Exception):
     """No point was found where one was sought."""
 
 
-def _on_chord(points: dict[float, Point], function: Callable[[Point], float]) -> float | None:
+def _on_chord(points: dict[float, CurvePoint], function: Callable[[CurvePoint], float]) -> float | None:
     """Add a test function's zero on the chord of the two points next to it. Returns its arclength, None without one."""
     one, other = sorted(points, key=lambda at: abs(function(points[at])))[:2]
     near, far = points[one], points[other]
@@ -284,7 +288,7 @@ def _on_chord(points: dict[float, Point], function: Callable[[Point], float]) ->
 class Path:
     """A curve while it is followed from a point one way, within the ranges of its numbers.
 
-    head: the last point; trail: y (k + m,) of some of its sequence before it; points: what is kept of all; special: its
+    head: the last point; trail: y (k + m,) of some of its sequence before it; points: data of all; special: its
     named points; step: the next one; end: why it is not followed further, "" while it is. What a curve watches, keeps
     and does where its sequence ends is said by its kind.
     """
@@ -294,7 +298,7 @@ class Path:
     edge: ClassVar[str]
     closed: ClassVar[str]
 
-    def __init__(self, table: Table, head: Point, most: int) -> None:
+    def __init__(self, table: Table, head: CurvePoint, most: int) -> None:
         self.table, self.head, self.most, self.problem = table, head, most, head.problem
         self.first, self.step, self.end, self.trail = head.y, table.step, "", list[np.ndarray]()
         self.points, self.special = [self._kept(head)], list[Any]()
@@ -325,19 +329,19 @@ class Path:
             step /= 2
         self._cross(failed, *self._last(head, failed))
 
-    def _longest(self, point: Point) -> float:
+    def _longest(self, point: CurvePoint) -> float:
         """Return the longest step: with a condition states may change fast, and it is the numbers' that is bounded."""
         numbers = point.tangent[self.problem.size :]
         return self.table.max_step / (1.0 if point.given is None else max(float(np.linalg.norm(numbers)), _FLAT))
 
-    def _add(self, before: Point, point: Point) -> None:
+    def _add(self, before: CurvePoint, point: CurvePoint) -> None:
         """Add a point, and the end if it is one."""
         self.head, self.trail = point, []
         self.points.append(self._kept(point))
         if not self.end and (why := self._ending(before, point)):
             self._end(why, point)
 
-    def _onward(self, point: Point) -> None:
+    def _onward(self, point: CurvePoint) -> None:
         """Add the next point of a smooth piece.
 
         Shorter steps are better with a condition, whose slopes are learnt on the way, and where a body may rest
@@ -348,30 +352,30 @@ class Path:
         self._add(self.head, point)
         self.trail = trail
 
-    def _ending(self, before: Point, point: Point) -> str:
+    def _ending(self, before: CurvePoint, point: CurvePoint) -> str:
         """Say why the path ends at a point that was added; "" if it does not."""
         numbers = point.y[self.problem.size :]
         if np.any((numbers <= _EDGE) | (numbers >= 1.0 - _EDGE)):
             return self.edge
         return self.closed if len(self.points) > 3 and self._returned(before, point) else ""
 
-    def _returned(self, before: Point, point: Point) -> bool:
+    def _returned(self, before: CurvePoint, point: CurvePoint) -> bool:
         """Say whether the path passes its first point between two."""
         piece, first = point.y - before.y, self.first - before.y
         share = first @ piece / max(float(piece @ piece), np.finfo(float).tiny)
         return bool(0.0 <= share < 1.0 and np.linalg.norm(first - share * piece) < 0.05 * np.linalg.norm(piece))
 
-    def _last(self, head: Point, step: float) -> tuple[Point, Point | None, bool]:
+    def _last(self, head: CurvePoint, step: float) -> tuple[CurvePoint, CurvePoint | None, bool]:
         """Return the last point of the present sequence within a step, and the first beyond it, None if none is near.
 
         And whether it is Newton's method that comes no further from the head, for nothing vanishes there: of orbits
-        that may not be moved, since others come to walls that nothing tells of.
+        that may not be moved, as others meet unknown walls.
 
         Test functions that vanish where sequences change (speeds of crossings, clearances, times between events) say
         where to look; bisection makes it sure.
         """
         low, high, seen = 0.0, step, [(0.0, head)]
-        beyond: Point | None = None
+        beyond: CurvePoint | None = None
         close = self.problem.close(head.y, _CLOSE)
         for attempt in range(_ATTEMPTS):
             if high - low <= close:
@@ -392,32 +396,32 @@ class Path:
         lost = low > least and (end is None or end - low > least) and not head.orbit.neutral
         return seen[-1][1], beyond, lost and regular(seen[-1][1]) is not None
 
-    def _note(self, point: Point, kind: str, note: str) -> None:
+    def _note(self, point: CurvePoint, kind: str, note: str) -> None:
         y = point.exact
         numbers, state = self.problem.numbers(y).tolist(), self.problem.state(y)
         self.special.append(self.named(len(self.points) - 1, kind, note, state, *numbers))
 
-    # -- what kinds of curves say
+    # -- by kind of curve
 
-    def _kept(self, point: Point) -> Any:
-        """Return what is kept of a point."""
+    def _kept(self, point: CurvePoint) -> Any:
+        """Return a point's data."""
         raise NotImplementedError
 
-    def _leaps(self, before: Point, point: Point) -> bool:
+    def _leaps(self, before: CurvePoint, point: CurvePoint) -> bool:
         """Say whether a point lies on another sheet than the one before it."""
         return False
 
-    def _passed(self, before: Point, point: Point) -> Point | None:
-        """Note what is named on the way to a point. Returns the point to add: another where the path ends, or None."""
+    def _passed(self, before: CurvePoint, point: CurvePoint) -> CurvePoint | None:
+        """Note special points on the way to a point. Returns the point to add: another where the path ends, or None."""
         raise NotImplementedError
 
-    def _cross(self, step: float, last: Point, beyond: Point | None, lost: bool) -> None:
+    def _cross(self, step: float, last: CurvePoint, beyond: CurvePoint | None, lost: bool) -> None:
         """Continue with another sequence of events, or with the last point where that is lost, or end the path.
 
         step: that leads from the head beyond the end of the sequence; last, beyond: points on both sides of it (_last).
         """
         raise NotImplementedError
 
-    def _end(self, why: str, point: Point) -> None:
+    def _end(self, why: str, point: CurvePoint) -> None:
         """End the path at a point."""
         self.end = why

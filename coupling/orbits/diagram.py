@@ -8,13 +8,13 @@ import numpy as np
 
 from vanedamp.coupling.orbits.bifurcations import SWITCHES, direction
 from vanedamp.coupling.orbits.branch import Branch, SpecialPoint
-from vanedamp.coupling.orbits.continuation import Continuation
-from vanedamp.coupling.orbits.curve import Point, beginning
+from vanedamp.coupling.orbits.continuation import BranchPath
+from vanedamp.coupling.orbits.curve import CurvePoint, beginning
 from vanedamp.coupling.orbits.first_orbit import Starts
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import WAVE, OrbitStatus, Zero, solve
 from vanedamp.coupling.orbits.period_map import PeriodMap
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 from vanedamp.coupling.orbits.waves import find_wave, of_waves
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
@@ -35,19 +35,19 @@ _MEANING = {
 
 
 class Diagram:
-    """The branches of a period map, found one after the other.
+    """The branches of a period map, found in turn.
 
     table: how to follow them; low, to: range of the parameter, to: None for a single orbit; starts: returns the states
-    from which the first orbit is sought; notes: what could not be done.
+    from which the first orbit is sought; notes: failures.
     """
 
     def __init__(
         self, period_map: PeriodMap, table: Table, low: float, to: float | None, starts: Callable[[], Starts]
     ) -> None:
         self.map, self.table, self.low, self.to, self.starts = period_map, table, low, to, starts
-        self.problems: dict[int, Problem] = {}
+        self.problems: dict[int, OrbitProblem] = {}
         self.finished: list[Branch] = []
-        self.current: Continuation | None = None
+        self.current: BranchPath | None = None
         self.notes: list[str] = []
         self._before = 0
 
@@ -70,15 +70,15 @@ class Diagram:
         return np.stack([head.y, head.row, *self.current.trail]), self.current.step
 
     def resume(self, branches: Sequence[Branch], head: np.ndarray, step: float, iterations: int) -> None:
-        """Take up what an interrupted search has found."""
+        """Resume from an interrupted search."""
         *self.finished, last = branches
         self._before = iterations
-        self.current = Continuation.resume(self._problem(last.periods), self.table, last, head, step)
+        self.current = BranchPath.resume(self._problem(last.periods), self.table, last, head, step)
         if self.current is None:
             raise InputError("the last orbit of the checkpoint is none any more; delete the checkpoint to start again")
 
     def follow(self, changed: Callable[[int, int], None]) -> None:
-        """Find all branches; changed: called with the number of orbits found and of those that there may be."""
+        """Find all branches; changed: called with orbits found and possible."""
         while True:
             current = self.current = self.current or self._next()
             if current is None:
@@ -94,24 +94,24 @@ class Diagram:
             self.finished.append(current.branch)
             self.current = None
 
-    def _next(self) -> Continuation | None:
-        """Return the next branch to follow; None if there is none."""
+    def _next(self) -> BranchPath | None:
+        """Return the next branch to follow; None without."""
         if not self.finished:
             return self._first()
         if not self.table.switch:
             return None
         for number, branch in enumerate(self.finished):
-            for place, point in enumerate(branch.special):
-                if point.kind not in SWITCHES or self._known(number, place, branch, point):
+            for index, point in enumerate(branch.special):
+                if point.kind not in SWITCHES or self._known(number, index, branch, point):
                     continue
                 if len(self.finished) >= _MOST_BRANCHES:
                     self.notes.append(f"only the first {_MOST_BRANCHES} branches were followed")
                     return None
-                if (found := self._switched(number, place, branch, point)) is not None:
-                    return found
+                if (path := self._switched(number, index, branch, point)) is not None:
+                    return path
         return None
 
-    def _first(self) -> Continuation:
+    def _first(self) -> BranchPath:
         """Return the branch through the first orbit. Raises InputError if there is none."""
         starts = self.starts()
         first, failed = self._solved(starts)
@@ -120,19 +120,19 @@ class Diagram:
         remedy = starts.remedy
         if starts.run is not None:
             of_run = starts.run()
-            found, more = self._solved(of_run)
-            if found is None:
+            point, more = self._solved(of_run)
+            if point is None:
                 remedy = f'start = "run" finds none either ({"; ".join(more)}): {of_run.remedy}'
             else:
-                own = found.problem.map.periods
-                remedy = f'start = "run" finds an orbit of {own} period(s)'
+                order = point.problem.map.periods
+                remedy = f'start = "run" finds an orbit of {order} period(s)'
         periods = " or ".join(map(str, dict.fromkeys(start.periods for start in starts.candidates)))
         raise InputError(
             f"orbit: no orbit of {periods} excitation period(s) at {self.table.parameter} = {self.low:g}: "
             f"{'; '.join(failed)}; {remedy}"
         )
 
-    def _solved(self, starts: Starts) -> tuple[Continuation | None, list[str]]:
+    def _solved(self, starts: Starts) -> tuple[BranchPath | None, list[str]]:
         """Return the branch through the first orbit found from some starts, and why none is found from others."""
         failed = dict[str, None]()
         for start in starts.candidates:
@@ -144,7 +144,7 @@ class Diagram:
                 zero = solve(problem, problem.pack(start.state, self.low), row)
             problem.count["iterations"] += zero.iterations
             if zero.status is OrbitStatus.OK:
-                return Continuation(self.table, Point(problem, zero, row)), list(failed)
+                return BranchPath(self.table, CurvePoint(problem, zero, row)), list(failed)
             failed[_MEANING[zero.status]] = None
             if zero.status is OrbitStatus.UNDETERMINED and problem.map.travelling is not None:
                 failed[WAVE] = None
@@ -155,20 +155,20 @@ class Diagram:
         """Range of the parameter, with its sign; 1 for a single orbit."""
         return 1.0 if self.to is None else self.to - self.low
 
-    def _problem(self, periods: int) -> Problem:
+    def _problem(self, periods: int) -> OrbitProblem:
         if periods not in self.problems:
             along = self.map.over(periods)
             along = of_waves(along) if self.table.wave and self.to is not None else along
-            self.problems[periods] = Problem.along(along, self.low, self._span)
+            self.problems[periods] = OrbitProblem.along(along, self.low, self._span)
         return self.problems[periods]
 
-    def _known(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> bool:
+    def _known(self, number: int, index: int, branch: Branch, point: SpecialPoint) -> bool:
         """Say whether a bifurcation's other branch was followed already, from here or to here."""
         scale, span = self.map.scale, self._span
         periods = branch.periods * (2 if point.kind == "period doubling" else 1)
         for other in self.finished:
             last = other.special[-1]
-            if other.source == (number, place):
+            if other.source == (number, index):
                 return True
             if other.source is None or other.periods != periods or not last.note.startswith("joins"):
                 continue
@@ -177,7 +177,7 @@ class Diagram:
                 return True
         return point.note == "branches meet" and branch.special[-1].note.startswith("joins")
 
-    def _switched(self, number: int, place: int, branch: Branch, point: SpecialPoint) -> Continuation | None:
+    def _switched(self, number: int, index: int, branch: Branch, point: SpecialPoint) -> BranchPath | None:
         """Return the branch that starts at a bifurcation; None, with a note, if no orbit of it is found."""
         doubled = point.kind == "period doubling"
         periods = branch.periods * (2 if doubled else 1)
@@ -195,14 +195,16 @@ class Diagram:
         for quarters in range(_QUARTERS):
             step = self.table.step / 4.0**quarters
             start = y + step * row
-            if (beside := beginning(problem, start, row)) is None:
+            if (guess := beginning(problem, start, row)) is None:
                 continue
             # the slope at the bifurcation itself says nothing of the other branch
-            zero = solve(problem, start, row, beside.slopes)
+            zero = solve(problem, start, row, guess.slopes)
             problem.count["iterations"] += zero.iterations
             onward = zero.y - y
             if zero.status is OrbitStatus.OK and np.linalg.norm(onward) < 3 * step:
-                return Continuation(self.table, Point(problem, zero, onward / np.linalg.norm(onward)), (number, place))
+                return BranchPath(
+                    self.table, CurvePoint(problem, zero, onward / np.linalg.norm(onward)), (number, index)
+                )
         self.notes.append(
             f"no orbit found on the other branch at the {point.kind} at {self.table.parameter} = {point.parameter:.9g}"
         )

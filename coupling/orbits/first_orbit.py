@@ -31,9 +31,9 @@ class Start(NamedTuple):
 
 
 class Starts(NamedTuple):
-    """Starts, the most promising first, and what to say if no orbit is found from any of them.
+    """Starts, the most promising first, and the message if all fail.
 
-    run: returns those of the scene's run, which are tried for the message only; None: they are
+    run: returns the scene's run's, tried for the message only; None: they are
     """
 
     candidates: Sequence[Start]
@@ -56,12 +56,12 @@ def of_run(period_map: PeriodMap, response: Response, periods: int | None) -> St
     """
     if response.final is None:
         raise InputError(f"orbit.start: the run of the scene ends early ({response.status}); change the scene")
-    kind, found = response.classification, periods_of(response.classification)
-    own = found or 1
-    repeats = found is not None and (periods or own) % own == 0
-    first = [Start(period_map.state_of(response.final), periods or own)] if repeats else []
+    kind, measured = response.classification, periods_of(response.classification)
+    default = measured or 1
+    repeats = measured is not None and (periods or default) % default == 0
+    first = [Start(period_map.state_of(response.final), periods or default)] if repeats else []
     states, sections = period_map.strobed(response.final, _WINDOW)
-    orders = [periods] if periods else sorted({own, *_ORDERS})
+    orders = [periods] if periods else sorted({default, *_ORDERS})
     spread = np.maximum(np.ptp(sections, axis=0), np.finfo(float).tiny)
     nearest, returns = (np.inf, 0), list[Start]()
     for order in orders:
@@ -70,10 +70,10 @@ def of_run(period_map: PeriodMap, response: Response, periods: int | None) -> St
         apart = (np.abs(sections[order:] - sections[:-order]) / spread).max(axis=1)
         places = np.argsort(apart, kind="stable")[:_MOST]
         nearest = min(nearest, (float(apart[places[0]]), order))
-        returns += [Start(states[place], order) for place in places]
+        returns += [Start(states[index], order) for index in places]
     if repeats:
         return Starts(first + returns, f"the run of the scene is {kind} {_FIGURE}; try another `from` or other periods")
-    asked = "" if found is None else f", not repeating after {periods}"
+    asked = "" if measured is None else f", not repeating after {periods}"
     return Starts(
         returns,
         f"the run of the scene is {kind}{asked}: over {len(states) - 1} periods it comes back to {nearest[0]:.2g} of "

@@ -1,4 +1,4 @@
-"""Multipliers of an orbit: the eigenvalues of its map's derivative, and what of them changes sign at bifurcations."""
+"""Multipliers of an orbit: the eigenvalues of its map's derivative, and their test functions."""
 
 from __future__ import annotations
 

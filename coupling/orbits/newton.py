@@ -19,12 +19,12 @@ from scipy.linalg import lstsq
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL, decided, multipliers, null_space
 from vanedamp.coupling.orbits.period_map import PeriodMap
-from vanedamp.coupling.orbits.problem import Problem
-from vanedamp.coupling.quantities.quantity import Measured, table
+from vanedamp.coupling.orbits.problem import OrbitProblem
+from vanedamp.coupling.quantities.quantity import QuantityRecord, table
 from vanedamp.coupling.scene.units import unit_of
 from vanedamp.files.display import Displayed
 
-#: what to do where sectors have events at one instant
+#: remedy where sectors have events at one instant
 WAVE = "[orbit] wave = true finds the travelling wave of a tuned ring"
 #: coordinates of a state that are printed one by one
 _PRINTED = 12
@@ -63,7 +63,7 @@ class Section(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Orbit(Measured, Displayed):
+class PeriodicOrbit(QuantityRecord, Displayed):
     """A periodic orbit, or the last state of a search for one. All its quantities are attributes (results.md).
 
     parameter: of the branch, nan without one; state: (k,) at the start of the excitation's period; periods: of the
@@ -119,18 +119,18 @@ class Orbit(Measured, Displayed):
     def section(self) -> Section:
         """Where its derivative is taken: at the start of the period unless an event or a contact at rest makes a kink.
 
-        A kink at the start of a passage is none of the motion, whose neighbours come to that event or rest as it does.
+        A kink at the start of a passage is none of the motion.
         """
-        own = Section(0.0, self.map, self.state, self.passage)
+        section = Section(0.0, self.map, self.state, self.passage)
         if self.map is None or self.passage.status not in (PassageStatus.GRAZING, PassageStatus.COINCIDENT):
-            return own
+            return section
         for periods in self._quiet():
             if (later := self.map.later(self.state, periods)) is None:
                 continue
             passage = later[0](later[1])
             if passage.status is PassageStatus.OK:
                 return Section(periods, *later, passage)
-        return own
+        return section
 
     def _quiet(self) -> list[float]:
         """Return times amid the longest intervals between events, in periods, the longest first."""
@@ -138,7 +138,7 @@ class Orbit(Measured, Displayed):
         times = self.map.times(self.passage)
         ends = np.array([*times, times[0] + self.periods] if times else [0.0, self.periods])
         longest = np.argsort(-np.diff(ends), kind="stable")[:_SECTIONS]
-        return [float((ends[place] + ends[place + 1]) / 2 % self.periods) for place in longest]
+        return [float((ends[index] + ends[index + 1]) / 2 % self.periods) for index in longest]
 
     @cached_property
     def _multipliers(self) -> tuple[np.ndarray, int]:
@@ -173,7 +173,7 @@ class Orbit(Measured, Displayed):
         return self.map.over(self.periods).quantities(self.state, *self._multipliers, status)
 
     def __dir__(self) -> Iterable[str]:
-        """Return the names of attributes, those of all quantities among them: what it has takes a run to know."""
+        """Return the names of attributes, those of all quantities among them: a run decides which it has."""
         return [*object.__dir__(self), *table()]
 
 
@@ -188,33 +188,33 @@ class Zero(NamedTuple):
     iterations: int
 
     @classmethod
-    def of(cls, problem: Problem, orbit: Orbit, *numbers: float) -> Zero:
+    def of(cls, problem: OrbitProblem, orbit: PeriodicOrbit, *numbers: float) -> Zero:
         """Return that of an orbit at some numbers."""
         return cls(orbit.status, problem.pack(orbit.state, *numbers), orbit.passage, orbit.residual, orbit.iterations)
 
-    def orbit(self, problem: Problem) -> Orbit:
+    def orbit(self, problem: OrbitProblem) -> PeriodicOrbit:
         """Return the record of it: the first number is the orbit's parameter."""
         stopped = self.status is OrbitStatus.STOPPED
-        return Orbit(
+        return PeriodicOrbit(
             self.status, float([*problem.numbers(self.y), math.nan][0]), problem.state(self.y), problem.map.periods,
             problem.map.scale, self.passage, self.missed, self.iterations, map=None if stopped else problem.at(self.y),
         )  # fmt: skip
 
 
-def find_orbit(period_map: PeriodMap, start: np.ndarray) -> Orbit:
+def find_orbit(period_map: PeriodMap, start: np.ndarray) -> PeriodicOrbit:
     """Return the periodic orbit that Newton's method finds from a state (k,), or the last iterate and why it failed."""
     orbit = zero_of_map(period_map, start)
     return with_symmetry(orbit) if orbit.status is OrbitStatus.OK else orbit
 
 
-def zero_of_map(period_map: PeriodMap, start: np.ndarray) -> Orbit:
+def zero_of_map(period_map: PeriodMap, start: np.ndarray) -> PeriodicOrbit:
     """Return the same, without whether it is symmetric."""
-    problem = Problem(period_map)
+    problem = OrbitProblem(period_map)
     return solve(problem, problem.pack(np.asarray(start, float)), np.zeros((0, problem.size))).orbit(problem)
 
 
 def solve(
-    problem: Problem, start: np.ndarray, row: np.ndarray, slopes: np.ndarray | None = None, iterations: int = 20,
+    problem: OrbitProblem, start: np.ndarray, row: np.ndarray, slopes: np.ndarray | None = None, iterations: int = 20,
     halvings: int = 10, level: float | None = None, condition: Callable[[np.ndarray, Passage], float] | None = None,
 ) -> Zero:  # fmt: skip
     """Return the zero in the plane where `row` (k + m,) times y is `level`, by default through `start` (k + m,).
@@ -223,7 +223,7 @@ def solve(
     `condition`, another function that is to vanish. The first block (k, k) is exact at every step, the rest is mended
     on the way (Broyden 1965). Steps are least squares of least norm, so that neutral coordinates stay where they are;
     a step that does not lessen the residual, such as one into another sequence of events, is halved. With a condition
-    the sequence stays that of the start.
+    the sequence stays.
     """
     k, passage = problem.size, problem.passage(start)
     if passage is None:
@@ -239,7 +239,7 @@ def solve(
     J, plane = np.zeros((k, len(start))) if slopes is None else slopes.copy(), row @ start if level is None else level
     for count in range(1, iterations + 1):
         J[:k, :k] = problem.by_state(passage)
-        # onto the orbits first: what that does to a condition is learnt on the way
+        # onto the orbits first
         begins = condition is not None and count == 1
         wanted = np.append(residual[:k], 0.0) if begins else residual
         step = least_squares(np.vstack([J, row]), -np.append(wanted, row @ y - plane))
@@ -271,13 +271,13 @@ def solve(
     return Zero(status, y, passage, off, count)
 
 
-def _reach(problem: Problem, passage: Passage, size: float) -> float:
+def _reach(problem: OrbitProblem, passage: Passage, size: float) -> float:
     """Return the size of a passage's sums: scaled states times its derivative."""
     return size * (1.0 + float(np.abs(problem.derivative(passage)).max(initial=0.0)))
 
 
 def _taken(
-    problem: Problem, missed: Callable[[np.ndarray, Passage], np.ndarray], y: np.ndarray, step: np.ndarray,
+    problem: OrbitProblem, missed: Callable[[np.ndarray, Passage], np.ndarray], y: np.ndarray, step: np.ndarray,
     passage: Passage, bound: np.ndarray, halvings: int,
 ) -> tuple[tuple[np.ndarray, Passage, np.ndarray] | None, bool]:  # fmt: skip
     """Take a step, or the largest part of it that lessens the residual, as a whole or, by half, that of the orbit.
@@ -288,13 +288,13 @@ def _taken(
     changed, share, k = False, 1.0, problem.size
     for _ in range(halvings):
         trial = y + share * step
-        found = problem.passage(trial) if np.isfinite(trial).all() else None
-        if found is not None and (len(bound) == k or found.sequence == passage.sequence):
-            residual = missed(trial, found)
+        tried = problem.passage(trial) if np.isfinite(trial).all() else None
+        if tried is not None and (len(bound) == k or tried.sequence == passage.sequence):
+            residual = missed(trial, tried)
             less = np.linalg.norm(residual) < (1.0 - 1e-3 * share) * np.linalg.norm(bound)
             if less or np.linalg.norm(residual[:k]) < 0.5 * np.linalg.norm(bound[:k]):
-                return (trial, found, residual), changed
-            changed = changed or found.sequence != passage.sequence
+                return (trial, tried, residual), changed
+            changed = changed or tried.sequence != passage.sequence
         share /= 2
     return None, changed
 
@@ -304,12 +304,12 @@ def least_squares(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.asarray(lstsq(matrix, right, cond=NULL, check_finite=False)[0])
 
 
-def with_symmetry(orbit: Orbit) -> Orbit:
+def with_symmetry(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """Return the orbit with whether it is symmetric, which takes another half of a period."""
-    found = None if orbit.map is None else orbit.map.mirrored(orbit.state)
-    if found is None:
+    image = None if orbit.map is None else orbit.map.mirrored(orbit.state)
+    if image is None:
         return orbit
-    difference, size = (found - orbit.state) / orbit.scale, 1.0 + float(np.abs(orbit.state / orbit.scale).max())
+    difference, size = (image - orbit.state) / orbit.scale, 1.0 + float(np.abs(orbit.state / orbit.scale).max())
     for free in null_space(orbit.derivative):  # where a body rests is nothing that a mirror could change
         difference = difference - free * (free @ difference)
     return replace(orbit, symmetric=bool(np.abs(difference).max() < _SYMMETRIC * size))

@@ -1,4 +1,4 @@
-"""Quantities of orbits (coupling.quantities): those of a run over an orbit's own periods."""
+"""Quantities of orbits (coupling.quantities), over an orbit's periods."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.orbits.multipliers import decided
-from vanedamp.coupling.quantities.exponents import told
+from vanedamp.coupling.quantities.exponents import exponents_as
 from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.response.response import Response
 
@@ -35,14 +35,14 @@ def quantities_of(run: Response, missed: float, exponents: Mapping[str, Any] | N
     where it ends early; exponents: `exponents_of` the orbit; None: unknown.
     """
     known: dict[str, Any] = {} if exponents is None else {"lyapunov": exponents}
-    found = dict[str, Any]()
+    values = dict[str, Any]()
     for name, one in table().items():
         if one.lacking(NOT_IN_ORBITS) is None:
             value = one.of(known) if one.exists(known) else getattr(run, name)
             if value is not None or name in run.quantities:
                 unknown = value is None or not (missed < _LEFT or one.text)
-                found[name] = value if not unknown else np.full(np.shape(value), np.nan)[()]
-    return found
+                values[name] = value if not unknown else np.full(np.shape(value), np.nan)[()]
+    return values
 
 
 def exponents_of(
@@ -57,4 +57,4 @@ def exponents_of(
     with np.errstate(divide="ignore"):
         rates = np.sort(np.log(sizes))[::-1] / (periods * period)
     confidence = 0.0 if len(rates) else np.nan
-    return told(status, "periodic" if known else "undecided", rates.tolist(), confidence, period)
+    return exponents_as(status, "periodic" if known else "undecided", rates.tolist(), confidence, period)

@@ -15,10 +15,10 @@ from vanedamp.coupling.model_order.selection import warnings_of
 from vanedamp.coupling.orbits import newton
 from vanedamp.coupling.orbits.borders import Borders
 from vanedamp.coupling.orbits.branch import Branches, unknown
-from vanedamp.coupling.orbits.checkpoint import Checkpoint
+from vanedamp.coupling.orbits.checkpoint import BranchCheckpoint
 from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import Start, Starts, of_linear_motion, of_run
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
+from vanedamp.coupling.orbits.newton import OrbitStatus, PeriodicOrbit
 from vanedamp.coupling.orbits.period_map import PeriodMap, centred, period_map
 from vanedamp.coupling.orbits.waves import find_wave, of_waves
 from vanedamp.coupling.response.evaluation import periods_of
@@ -37,10 +37,10 @@ from vanedamp.files.toml_input import InputError
 _STARTS = ("initial",)
 
 
-def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
+def find_orbit(scene: Scene, start: RestartState | None = None) -> PeriodicOrbit:
     """Return the periodic orbit of a scene that its [orbit] table describes, at the table's `from`.
 
-    start: a state near it, in place of the table's `start`. Raises InputError for a scene that the exact engine cannot
+    start: a state near it, instead of the table's `start`. Raises InputError for a scene that the exact engine cannot
     run, or a parameter that is no number of it; an orbit that is not found is a status of the result.
     """
     search = _Search(scene)
@@ -49,13 +49,13 @@ def find_orbit(scene: Scene, start: RestartState | None = None) -> Orbit:
     else:
         candidates = list(search.starts().candidates)
     for state, periods in candidates:
-        found = (find_wave if search.table.wave else newton.find_orbit)(search.map.over(periods), state)
-        if found.status is OrbitStatus.OK:
+        orbit = (find_wave if search.table.wave else newton.find_orbit)(search.map.over(periods), state)
+        if orbit.status is OrbitStatus.OK:
             break
-    return replace(found, parameter=search.low)
+    return replace(orbit, parameter=search.low)
 
 
-def settled_orbit(scene: Scene) -> Orbit | None:
+def settled_orbit(scene: Scene) -> PeriodicOrbit | None:
     """Return the orbit on which the run of a scene settles; None if it does not."""
     response = simulate(scene)
     periods = periods_of(response.classification)
@@ -73,9 +73,9 @@ def orbits(
     checkpoint: str | Path | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> Branches:
-    """Follow the periodic orbits of a scene over a number of it, as its [orbit] table says.
+    """Follow the periodic orbits of a scene over a number of it, by its [orbit] table.
 
-    progress: called with the number of points found and of those that there may be; checkpoint: a file to which found
+    progress: called with points found and possible; checkpoint: a file to which found
     points are written and from which an interrupted call resumes; the caller removes it once the result is safe
     (files.checkpoint_file.clear).
     Raises InputError for a scene without the table, one that the exact engine cannot run, a parameter that is no
@@ -101,14 +101,14 @@ def orbits(
             () if borders is None else tuple(borders.finished),
         )  # fmt: skip
 
-    with Checkpoint(checkpoint, scene, data, lambda: (found(), *diagram.place)) as kept:
-        if kept.found is not None:
-            diagram.resume(kept.found.branches, kept.head, kept.step, kept.found.iterations)
+    with BranchCheckpoint(checkpoint, scene, data, lambda: (found(), *diagram.place)) as saved:
+        if saved.found is not None:
+            diagram.resume(saved.found.branches, saved.head, saved.step, saved.found.iterations)
             if borders is not None:
-                borders.resume(kept.found.borders)
+                borders.resume(saved.found.borders)
 
         def changed(done: int, total: int) -> None:
-            kept.changed()
+            saved.changed()
             if progress is not None:
                 progress(done, total)
 
@@ -119,7 +119,7 @@ def orbits(
     return found()
 
 
-def orbit_at(branches: Branches, branch: int = 0, point: int = 0) -> Orbit:
+def orbit_at(branches: Branches, branch: int = 0, point: int = 0) -> PeriodicOrbit:
     """Return an orbit of branches, by the numbers of its branch and of its point there, with its period map.
 
     Raises InputError where branches have no such point.
@@ -127,9 +127,9 @@ def orbit_at(branches: Branches, branch: int = 0, point: int = 0) -> Orbit:
     if not 0 <= branch < len(branches.branches) or not 0 <= point < len(branches.branches[branch].parameter):
         points = ", ".join(str(len(each.parameter)) for each in branches.branches)
         raise InputError(f"branch {branch}, point {point}: there are branches of {points} points, counted from 0")
-    own = branches.branches[branch]
-    found = map_along(branches.scene).over(own.periods).at(float(own.parameter[point]))
-    return replace(newton.find_orbit(found, own.state[point]), parameter=float(own.parameter[point]))
+    along = branches.branches[branch]
+    map_ = map_along(branches.scene).over(along.periods).at(float(along.parameter[point]))
+    return replace(newton.find_orbit(map_, along.state[point]), parameter=float(along.parameter[point]))
 
 
 def map_along(scene: Scene) -> PeriodMap:

@@ -1,8 +1,8 @@
-"""Orbits beyond the place where the sequence of events along a branch ends.
+"""Orbits beyond the point where the sequence of events along a branch ends.
 
 An orbit of another sequence is sought where the branch would continue, at the root of the distance along it where a
 new impact grazes, and where an event passes the start of the period: there the state at the start jumps, by what the
-event does, while the orbit continues as if nothing had happened. It is followed past that place by states at another
+event does, while the orbit continues as if nothing had happened. It is followed further by states at another
 moment of the period.
 """
 
@@ -17,16 +17,16 @@ from scipy.optimize import brentq
 
 from vanedamp.coupling.derivatives.passage import Passage
 from vanedamp.coupling.orbits.bifurcations import Located, bifurcations
-from vanedamp.coupling.orbits.curve import Point, beginning, corrected, near, reached
+from vanedamp.coupling.orbits.curve import CurvePoint, beginning, corrected, near, reached
 from vanedamp.coupling.orbits.multipliers import null_space
 from vanedamp.coupling.orbits.newton import least_squares
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 
 #: note on a body that reaches a wall and has free travel on the other side
 CENTRED = ": a body that may rest anywhere is moved to the middle of where it does not"
 #: scaled distance within which a neutral coordinate is sought an end
 _FARTHEST = 10.0
-#: how often the search for the place of a new event is widened
+#: how often the search for a new event is widened
 _WIDENINGS = 6
 #: periods from the start of one within which an event passes it; steps past it; scaled distance of a state behind
 _AT_START, _STEPS, _BEHIND = 1e-3, 12, 1e-6
@@ -35,10 +35,10 @@ _AT_START, _STEPS, _BEHIND = 1e-3, 12, 1e-6
 class OtherSide:
     """The search for orbits of other sequences; step, min_step: of the arclength of the branch."""
 
-    def __init__(self, problem: Problem, step: float, min_step: float) -> None:
+    def __init__(self, problem: OrbitProblem, step: float, min_step: float) -> None:
         self.problem, self.step, self.min_step = problem, step, min_step
 
-    def find(self, last: Point, step: float) -> tuple[Point | None, str]:
+    def find(self, last: CurvePoint, step: float) -> tuple[CurvePoint | None, str]:
         """Return an orbit beyond a change of sequence and how it was found."""
         for size in self.step * 10.0 ** np.arange(-3.0, -7.0, -1.0):
             y = last.y + size * last.tangent
@@ -53,7 +53,7 @@ class OtherSide:
                 return point, f", stepped over by {factor * step:.2g}"
         return None, ""
 
-    def past_the_start(self, last: Point) -> tuple[Point, list[Located]] | None:
+    def past_the_start(self, last: CurvePoint) -> tuple[CurvePoint, list[Located]] | None:
         """Return an orbit beyond the last one, where an event passes the start, and the bifurcations on the way.
 
         The branch is followed from where no event is near, to the end of the range at most. None where no event passes
@@ -69,7 +69,7 @@ class OtherSide:
         head = _moved(last, there, later)
         if head is None:
             return None
-        found, step = list[Located](), self.step
+        events, step = list[Located](), self.step
         for _ in range(_STEPS):
             point = reached(head, step)
             if point is None:
@@ -78,17 +78,17 @@ class OtherSide:
             for each in bifurcations(head, point):
                 y = _later(there, each.point.y, length - later)
                 if y is not None:
-                    own = replace(each.point, problem=self.problem, zero=each.point.zero._replace(y=y))
-                    found.append(each._replace(point=own))
+                    moved = replace(each.point, problem=self.problem, zero=each.point.zero._replace(y=y))
+                    events.append(each._replace(point=moved))
             before = (bisect(there.at(each.y).times(each.passage), length - later) for each in (head, point))
             passed = len(set(before)) > 1
             head = point
             if passed or not 0.0 < point.y[-1] < 1.0:
                 back = _moved(point, self.problem, length - later)
-                return None if back is None else (back, found)
+                return None if back is None else (back, events)
         return None
 
-    def passage(self, last: Point) -> Passage | None:
+    def passage(self, last: CurvePoint) -> Passage | None:
         """Return a passage of the next sequence of events, of a state close to the last orbit; None if none is near."""
         for size in self.step * 10.0 ** np.arange(-6.0, 0.0):
             passage = self.problem.passage(last.y + size * last.tangent)
@@ -96,7 +96,7 @@ class OtherSide:
                 return passage
         return None
 
-    def centred(self, last: Point) -> Point | None:
+    def centred(self, last: CurvePoint) -> CurvePoint | None:
         """Return the orbit with its neutral coordinates centred in its sequence's range; None if they already are.
 
         A body that may rest anywhere is at a wall, though its motion has free travel on the other side. The tangent
@@ -117,12 +117,12 @@ class OtherSide:
                 break
         return replace(point, row=tangent)
 
-    def _at_parameter(self, y: np.ndarray, last: Point) -> Point | None:
-        """Return the point of the same sequence at the parameter of y; None if there is none."""
+    def _at_parameter(self, y: np.ndarray, last: CurvePoint) -> CurvePoint | None:
+        """Return the point of the same sequence at the parameter of y; None without."""
         point = near(last, y, self.problem.row())
         return point if point is not None and point.passage.sequence == last.passage.sequence else None
 
-    def _amid(self, y: np.ndarray, last: Point) -> np.ndarray | None:
+    def _amid(self, y: np.ndarray, last: CurvePoint) -> np.ndarray | None:
         """Return y with its neutral coordinates centred in its sequence's range; None for an orbit without any."""
         neutral = null_space(last.orbit.derivative)
         for free in neutral:
@@ -137,7 +137,7 @@ class OtherSide:
                 y = y + sum(reaches) / 2 * direction
         return y if len(neutral) else None
 
-    def _beside(self, last: Point, y: np.ndarray, passage: Passage) -> Point | None:
+    def _beside(self, last: CurvePoint, y: np.ndarray, passage: Passage) -> CurvePoint | None:
         """Return a point of another sequence that begins where the present one ends; None if none is found.
 
         y, passage: beyond the end, along the tangent. The new event adds v k to the residual, k a direction and v a
@@ -158,13 +158,13 @@ class OtherSide:
             distance = self._root(last, base, away * min(measure / kick, (measure / kick) ** 2), residual)
             if distance is None:
                 continue
-            beside = beginning(problem, base + distance * last.tangent, alpha / length)
-            point = beside and near(beside, beside.y, beside.row, 2 * length * measure)
+            guess = beginning(problem, base + distance * last.tangent, alpha / length)
+            point = guess and near(guess, guess.y, guess.row, 2 * length * measure)
             if point is not None and point.passage.sequence != sequence:
                 return point
         return None
 
-    def _root(self, last: Point, base: np.ndarray, distance: float, residual: np.ndarray) -> float | None:
+    def _root(self, last: CurvePoint, base: np.ndarray, distance: float, residual: np.ndarray) -> float | None:
         """Return how far along the tangent from `base` the residual has no part in another; None if nowhere near."""
 
         def part(at: float) -> float:
@@ -182,18 +182,18 @@ class OtherSide:
         return None
 
 
-def _moved(point: Point, other: Problem, later: float) -> Point | None:
-    """Return a point as one of another problem, whose section is some periods later; None if it is lost."""
+def _moved(point: CurvePoint, other: OrbitProblem, later: float) -> CurvePoint | None:
+    """Return a point in another problem, some periods later; None if lost."""
     y, before = (_later(point.problem, at, later) for at in (point.y, point.y - _BEHIND * point.tangent))
     if y is None or before is None:
         return None
     return beginning(other, y, (y - before) / np.linalg.norm(y - before))
 
 
-def _later(problem: Problem, y: np.ndarray, later: float) -> np.ndarray | None:
+def _later(problem: OrbitProblem, y: np.ndarray, later: float) -> np.ndarray | None:
     """Return state and number (k + 1,) some periods later on the motion from y (k + 1,)."""
-    found = problem.at(y).later(problem.state(y), later)
-    return None if found is None else problem.pack(found[1], *problem.numbers(y))
+    image = problem.at(y).later(problem.state(y), later)
+    return None if image is None else problem.pack(image[1], *problem.numbers(y))
 
 
 def _reach(stays: Callable[[float], bool], sign: float) -> float:

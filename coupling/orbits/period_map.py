@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import Dynamics
+from vanedamp.coupling.derivatives.dynamics import ScaledDynamics
 from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.frame import Frame
-from vanedamp.coupling.derivatives.numbers import Numbers, numbers_of
+from vanedamp.coupling.derivatives.numbers import Parameters, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.symmetry import Symmetry
 from vanedamp.coupling.derivatives.walk import EVENTS_PER_PERIOD, PassageWalk, periods_from, run_from
@@ -39,7 +39,7 @@ from vanedamp.files.toml_input import InputError
 
 #: periods before the end of a part that are at its end
 _AT_END = 1e-9
-#: what a map has of its scene once it is asked for
+#: computed of a map's scene once needed
 _EQUATIONS = ("scene", "_frame", "dynamics", "_event_names")
 
 
@@ -65,7 +65,7 @@ class PeriodMap:
     wave: bool = False
     begin: float = 0.0
     made: Callable[[Scene], Scene] = lambda given: given
-    #: the last run, of this map or one at another value, whose subsystems the next one reuses where they are the same
+    #: the last run, of this map or one at another value, for its subsystems
     earlier: list[EventRun] = field(default_factory=list, repr=False)
 
     @cached_property
@@ -78,12 +78,12 @@ class PeriodMap:
         return Frame(self.scene, self.speed, begin=self.begin)
 
     @cached_property
-    def dynamics(self) -> Dynamics:
+    def dynamics(self) -> ScaledDynamics:
         """The flows of the scene that runs."""
-        return Dynamics(self._frame, self.scale)
+        return ScaledDynamics(self._frame, self.scale)
 
     @cached_property
-    def _numbers(self) -> Numbers | None:
+    def _numbers(self) -> Parameters | None:
         if not self.numbers:
             return None
         return numbers_of(self.given, self.numbers, self.dynamics, derived=partial(opaque, self.made))
@@ -131,14 +131,14 @@ class PeriodMap:
 
         The first with a defect is the last. passed: called with the number of periods done.
         """
-        found = list[tuple[np.ndarray, np.ndarray, PassageStatus]]()
+        walked = list[tuple[np.ndarray, np.ndarray, PassageStatus]]()
         for one in periods_from(self.dynamics, state, periods, self.earlier):
-            found.append(one)
+            walked.append(one)
             if passed is not None:
-                passed(len(found))
+                passed(len(walked))
             if one[2] is not PassageStatus.OK:
                 break
-        return found
+        return walked
 
     def at(self, value: float) -> PeriodMap:
         """Return the map with the parameter at a value. Raises InputError for a value that makes it no scene."""
@@ -153,14 +153,14 @@ class PeriodMap:
         return self._with_equations(periods=periods)
 
     def by(self, numbers: tuple[str, ...]) -> PeriodMap:
-        """Return the same map, whose passages have derivatives by numbers of the scene, by their paths."""
+        """Return the map with derivatives by numbers of the scene, by paths."""
         return self._with_equations(numbers=numbers)
 
     def _with_equations(self, **changes: Any) -> PeriodMap:
         """Return the map with fields changed that its equations do not depend on."""
-        found = replace(self, **changes)
-        found.__dict__.update({name: made for name, made in self.__dict__.items() if name in _EQUATIONS})
-        return found
+        map_ = replace(self, **changes)
+        map_.__dict__.update({name: made for name, made in self.__dict__.items() if name in _EQUATIONS})
+        return map_
 
     @property
     def length(self) -> float:
@@ -229,7 +229,7 @@ class PeriodMap:
         for trace in run.course(periods):
             count = int(trace.at[COUNT])
             for i in np.flatnonzero(trace.time[:count] == 0.0).tolist():
-                if trace.period[i] == len(states):  # what happens at that instant comes after it
+                if trace.period[i] == len(states):  # events at that instant come after it
                     states.append(self._frame.to_state @ np.concatenate([trace.q[i], trace.v[i]]))
         if run.status is Status.OK and (state := run.final()) is not None:
             states.append(self.state_of(state))
@@ -243,7 +243,7 @@ class PeriodMap:
         return self._frame.linear_orbit()
 
     def mirrored(self, state: np.ndarray) -> np.ndarray | None:
-        """Return the mirror image of a state half a period later, (k,); None for a scene without that symmetry.
+        """Return the mirror image of a state half a period later, (k,); None without that symmetry.
 
         None, too, where the engine does not come so far.
         """

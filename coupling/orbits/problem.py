@@ -18,16 +18,16 @@ from vanedamp.coupling.tangents.differences import NotSmooth
 from vanedamp.files.record import empty
 from vanedamp.files.toml_input import InputError
 
-#: scenes and passages that are kept for the next step, which often wants them again; more would fill the memory
+#: scenes and passages that are kept for the next step, which often needs them; more would fill the memory
 _MAPS, _PASSAGES = 3, 64
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class OrbitProblem:
     """Orbits of a period map over m numbers of its scene; none are those of the map as it is.
 
     Points are y (k + m,): states over the map's scale and the root of its size, so that their mean square counts, and
-    numbers as shares of their ranges. paths: of the numbers; origin, span: (m,) where shares are 0, and the ranges;
+    numbers as fractions of their ranges. paths: of the numbers; origin, span: (m,) where these are 0, and the ranges;
     mirrored: whether orbits are symmetric, and the map takes half a period (PeriodMap.half); anchor: (k, k) what makes
     `by_state` regular where any orbit may be moved (`anchored`); count: of Newton's iterations so far.
     """
@@ -43,7 +43,7 @@ class Problem:
     _passages: dict[bytes, Passage | None] = field(default_factory=dict)
 
     @classmethod
-    def along(cls, period_map: PeriodMap, low: float, span: float) -> Problem:
+    def along(cls, period_map: PeriodMap, low: float, span: float) -> OrbitProblem:
         """Return the orbits over a range of a map's own parameter."""
         return cls(period_map, (period_map.parameter,), np.array([low]), np.array([span]))
 
@@ -74,7 +74,7 @@ class Problem:
         return np.asarray(self.origin + self.span * y[self.size :])
 
     def close(self, y: np.ndarray, share: float) -> float:
-        """Return the scaled distance that is a share of the smallest number, at most of its range."""
+        """Return the scaled distance that is a fraction of the smallest number, at most of its range."""
         shares = np.abs(self.numbers(y) / self.span)
         return share * float(np.min(shares, where=shares > 0.0, initial=1.0))
 
@@ -128,15 +128,15 @@ class Problem:
             return np.full((self.size, len(paths)), np.nan)
         return np.asarray(passage.by_number / self.weight[:, None] * self.span[:count])
 
-    def anchored(self, passage: Passage) -> Problem:
-        """Return the problem whose `by_state` leaves those directions where they are in which an orbit may be moved."""
+    def anchored(self, passage: Passage) -> OrbitProblem:
+        """Return the problem whose `by_state` keeps the directions in which an orbit may be moved."""
         rows, sizes, columns = svd(self.derivative(passage) - np.eye(self.size))
         null = sizes <= NULL * max(1.0, sizes[0])
         return replace(self, anchor=rows[:, null] @ columns[null], _passages={})
 
 
-def _keep(kept: dict[Any, Any], key: Any, value: Any, most: int) -> None:
-    """Keep a value in place of the oldest of many."""
-    kept[key] = value
-    if len(kept) > most:
-        del kept[next(iter(kept))]
+def _keep(cache: dict[Any, Any], key: Any, value: Any, most: int) -> None:
+    """Keep a value instead of the oldest of many."""
+    cache[key] = value
+    if len(cache) > most:
+        del cache[next(iter(cache))]

@@ -11,7 +11,7 @@ from vanedamp.coupling.quantities.quantity import quantity
 ORDER = 50
 
 
-def told(
+def exponents_as(
     status: str, kind: str, exponents: Sequence[float], confidence: float = math.nan, period: float = math.nan
 ) -> dict[str, Any]:
     """Return what quantities need of exponents, 1/s, the largest first, with its confidence; period: s."""

@@ -82,13 +82,13 @@ def quantity(
 @cache
 def table() -> Mapping[str, Quantity]:
     """Return all quantities by name, family by family."""
-    found: dict[str, Quantity] = {}
+    quantities: dict[str, Quantity] = {}
     for name, module in FAMILIES.all().items():
         for one in declared_in(module):
-            if one.name in found:
-                raise ValueError(f"{module.__name__}: there is a quantity {one.name} in {found[one.name].family}")
-            found[one.name] = one._replace(family=name)
-    return found
+            if one.name in quantities:
+                raise ValueError(f"{module.__name__}: there is a quantity {one.name} in {quantities[one.name].family}")
+            quantities[one.name] = one._replace(family=name)
+    return quantities
 
 
 def _of_table(name: str) -> Quantity:
@@ -132,12 +132,12 @@ class Later(Mapping[str, Any]):
         return dict, (dict(self),)
 
 
-def evaluated(sources: Mapping[str, Any], told: Callable[[Any], Any] = lambda value: value) -> Mapping[str, Any]:
-    """Return all quantities that some sources have, as `told` of them."""
+def evaluated(sources: Mapping[str, Any], convert: Callable[[Any], Any] = lambda value: value) -> Mapping[str, Any]:
+    """Return all quantities that some sources have, as `convert` of them."""
 
     def value(name: str) -> Any:
         with np.errstate(all="ignore"):
-            return told(table()[name].of(sources))
+            return convert(table()[name].of(sources))
 
     return Later((one.name for one in possible(frozenset(sources))), value)
 
@@ -161,7 +161,7 @@ def labels_along(names: Iterable[str], hot_spots: Iterable[str] = ()) -> dict[st
     return {dim: named for dim, named in known.items() if named}
 
 
-class Measured:
+class QuantityRecord:
     """Base of records with `quantities`: an attribute each, None where there is none; each family as a mapping."""
 
     quantities: Mapping[str, Any]

@@ -36,9 +36,9 @@ def _linear(name: str, curve: str, spot: Any) -> Any:
 
 
 def _scalar(name: str) -> list[Quantity]:
-    told = name == SCALARS[0]
+    main = name == SCALARS[0]
     return [
-        _of_spots(f"stress_{name}", f"amplitude of {_WORDS[name]}", attrgetter(name), spread=told, limited=told),
+        _of_spots(f"stress_{name}", f"amplitude of {_WORDS[name]}", attrgetter(name), spread=main, limited=main),
         _of_spots(f"stress_{name}_max", "the largest one of a period", attrgetter(f"{name}_max")),
         *(
             _of_spots(

@@ -27,12 +27,12 @@ SUMS = (
 
 def sources_of(row: np.ndarray) -> dict[str, Any]:
     """Return the sums of a row (S,) or of rows (k, S) by name, energies as one table."""
-    found: dict[str, Any] = dict(zip(SUMS, np.moveaxis(row, -1, 0), strict=True))
+    sources: dict[str, Any] = dict(zip(SUMS, np.moveaxis(row, -1, 0), strict=True))
     for name in COMPLEX:
-        real, imaginary = (found.pop(f"{name}_{part}") for part in ("real", "imag"))
-        found[name] = np.empty(np.shape(real), complex)
-        found[name].real, found[name].imag = real, imaginary
-    return found | {"energy": {name: found.pop(name) for name in ENERGIES}}
+        real, imaginary = (sources.pop(f"{name}_{part}") for part in ("real", "imag"))
+        sources[name] = np.empty(np.shape(real), complex)
+        sources[name].real, sources[name].imag = real, imaginary
+    return sources | {"energy": {name: sources.pop(name) for name in ENERGIES}}
 
 
 def nothing_known(row: np.ndarray) -> None:

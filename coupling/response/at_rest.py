@@ -14,7 +14,7 @@ def at_rest(measured, section, first, done):
     """Return whether all bodies are at rest in their cavities at the sections from first to done.
 
     The window has no impacts, and friction took no energy. A body that friction holds is at rest then: it would lose
-    energy if it slid; a disc, though, rolls. Others have to keep their place at all sections, and a reason to stay: a
+    energy if it slid; a disc, though, rolls. Others must stay at all sections, and a reason to stay: a
     wall or a body at rest on which they lie, or a floor that does not move along the cavity. A section does not
     suffice: at a resonance the motion turns round at the start of every period.
     """
@@ -55,7 +55,7 @@ def _keeps_place(measured, section, first, done, body):
 
 @strict
 def _closed(measured, section, first, done, unit):
-    """Whether the gap of a contact is closed at all sections, but for what is small against its free travel."""
+    """Whether the gap of a contact is closed at all sections, to a fraction of its free travel."""
     for i in range(first, done + 1):
         gap = measured.rest[unit]
         for body in range(len(measured.along)):

@@ -16,7 +16,7 @@ from vanedamp.files.toml_input import InputError
 
 
 def sectors(scene: Scene) -> Observer:
-    """Return what keeps the response of the sectors of a ring; impacts by contact if the method counts them."""
+    """Return the observer of the sectors of a ring; impacts by contact if the method counts them."""
     counted = getattr(METHODS.part(scene.solver.method), "WEARS", False)
     return Observer(
         lambda scene, run, known: {"sectors": response_by_sector(scene, run, slice(known["transient"], run.periods))},
@@ -27,21 +27,21 @@ def sectors(scene: Scene) -> Observer:
 def response_by_sector(scene: Scene, run: Outcome, window: slice) -> SectorResponse | None:
     """Return the response of the sectors over some periods; None where a method has not noted it."""
     system, records = run.system, run.records
-    found = records.outputs[window]
-    peak = found[..., 0]
-    if not found.size or not np.isfinite(peak).all():
+    extremes = records.outputs[window]
+    peak = extremes[..., 0]
+    if not extremes.size or not np.isfinite(peak).all():
         return None
     if len(records.swing):  # about the static deflection (static_deflection.about_mean)
-        static = found[..., 2].sum(axis=0) / (len(found) * system.period)
-        peak = np.maximum(peak - static, static - found[..., 1])
+        static = extremes[..., 2].sum(axis=0) / (len(extremes) * system.period)
+        peak = np.maximum(peak - static, static - extremes[..., 1])
     undamped, fixed = _linear(scene, system)
     impacts = _impacts(scene, run, window)
-    own = map(frozen, (peak.mean(axis=0), peak.max(axis=0), undamped, fixed, impacts))
-    return SectorResponse(dict(zip(BY_SECTOR, own, strict=True)), tuned=tuned_amplitude(scene))
+    values = map(frozen, (peak.mean(axis=0), peak.max(axis=0), undamped, fixed, impacts))
+    return SectorResponse(dict(zip(BY_SECTOR, values, strict=True)), tuned=tuned_amplitude(scene))
 
 
 def _linear(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
-    """Return the amplitudes (N,) without bodies, and with every body fixed, m."""
+    """Return the amplitudes (N,) without bodies, and with bodies fixed, m."""
     if scene.excitation.signal is not None:
         unknown = np.full(len(system.outputs), np.nan)
         return unknown, unknown
@@ -52,14 +52,14 @@ def _linear(scene: Scene, system: System) -> tuple[np.ndarray, np.ndarray]:
 def _impacts(scene: Scene, run: Outcome, window: slice) -> np.ndarray:
     """Return the impacts per period (N,) of the bodies in each sector; nan if they are not counted."""
     system, hits, rows = run.system, run.records.hits[window], run.rows
-    found = np.zeros(len(system.outputs))
+    impacts = np.zeros(len(system.outputs))
     if not hits.shape[1]:
-        return found * np.nan
+        return impacts * np.nan
     owner, counts = sectors_of_bodies(scene, system), hits.mean(axis=0)
     for row, (body, _, _) in enumerate(rows.places):
         if not rows.without_body[row] and owner[body] >= 0:
-            found[owner[body]] += counts[row]
-    return found
+            impacts[owner[body]] += counts[row]
+    return impacts
 
 
 def sectors_of_bodies(scene: Scene, system: System) -> list[int]:

@@ -28,7 +28,7 @@ class ContactStrength(OfContact):
 
     @property
     def sentence(self) -> str:
-        """What the record says, in a line."""
+        """The record in a line."""
         used = "" if self.utilisation is None else f", {self.utilisation:.3g} of first yield"
         return (
             f"{self.name}: up to {self.fastest:.3g} m/s, {self.peak_force:.4g} N for {1e6 * self.duration:.3g} us, "

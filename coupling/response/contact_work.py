@@ -1,4 +1,4 @@
-"""Work of contacts, what Archard's law and laws of impact wear take from a run, and the wear by it."""
+"""Work of contacts for Archard's law and laws of impact wear, and the wear by it."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def contact_name(damper: int, side: str, corner: int = -1) -> str:
     """Return the name of a contact, or of a face without corner, for people."""
     if side == "body":
         return f"bodies {damper} and {damper + 1}"
-    what = {"casing": "friction damper", "stop": "stop"}.get(side, f"{side} of body")
-    return f"{what} {damper}" + (f", corner {corner}" if corner >= 0 else "")
+    owner = {"casing": "friction damper", "stop": "stop"}.get(side, f"{side} of body")
+    return f"{owner} {damper}" + (f", corner {corner}" if corner >= 0 else "")
 
 
 @dataclass(frozen=True)

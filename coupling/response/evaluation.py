@@ -99,7 +99,7 @@ class Outcome:
 
 
 class Needs(NamedTuple):
-    """What a run has to record for an observer.
+    """Records that an observer needs.
 
     samples: of each period; log: whether to keep it; outputs: whether the largest values of further outputs are wanted;
     exponent: of the energies of impacts, whose sums and numbers are counted by contact then; course: functionals (k, n)
@@ -117,7 +117,7 @@ _NOTHING = Needs()
 
 
 def together(needs: Iterable[Needs]) -> Needs:
-    """Return what a run has to record for all of some observers."""
+    """Return the records that some observers need."""
     samples, logs, outputs, exponents, courses = zip(_NOTHING, *needs, strict=True)
     course = next((one for one in courses if one is not None), None)
     return Needs(max(samples), any(logs), any(outputs), next(filter(None, exponents), None), course)
@@ -125,17 +125,17 @@ def together(needs: Iterable[Needs]) -> Needs:
 
 @dataclass
 class Observer:
-    """One thing that a run keeps beside its sums, asked for before it begins.
+    """What a run keeps besides its sums, set before it begins.
 
     fields: returns fields of the response of a run that has ended, by name, from its scene, its outcome and the fields
-    known before; `warnings` are added to those. needs: what the run has to record.
+    known before; `warnings` are added to those. needs: records of the run.
     """
 
     fields: Callable[[Scene, Outcome, Fields], Fields]
     needs: Needs = _NOTHING
 
     def begin(self, scene: Scene, system: System) -> Needs:
-        """Return what a run of a scene has to record."""
+        """Return the records for a scene."""
         return self.needs
 
     def records(self, empty: Records) -> Records:
@@ -143,14 +143,14 @@ class Observer:
         return empty
 
     def linear(self, order: np.ndarray, motions: np.ndarray) -> Sequence[Any]:
-        """Return what is "linear" among the fields known before of f scenes, whose bodies are apart or fixed.
+        """Return "linear" from the fields known before of f scenes, whose bodies are apart or fixed.
 
         motions: (2, f, e, n) of harmonics of these orders (LinearResponse.motions). Empty: nothing is wanted.
         """
         return ()
 
     def look(self, run: Run, dropped: int | None) -> None:
-        """Look at a run before it goes on; dropped: periods that will be left out, None if that is open."""
+        """Look at a run before it continues; dropped: periods that will be left out, None if that is open."""
 
 
 class Ended(NamedTuple):
@@ -162,15 +162,12 @@ class Ended(NamedTuple):
 
 
 def run_scene(
-    run: Run,
-    scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
-    observers: Sequence[Observer] = (),
+    run: Run, scene: Scene, progress: Callable[[int, int], None] | None = None, observers: Sequence[Observer] = ()
 ) -> Ended:
     """Run all periods; where their number is open, until the response is steady; with steady = "auto", until its mean
     is known well enough.
 
-    progress: called with the number of periods done and of those to do; observers: look at the run as it goes.
+    progress: called with periods done and to do; observers: of the run.
     """
     transient = Transient(scene, run.outcome().system)
     dropped, periods, most = transient.length()
@@ -185,10 +182,10 @@ def run_scene(
             ended = _advanced(run, done, periods, progress, observers, dropped)
             if ended is not Status.OK:
                 return Ended(ended, dropped)
-        found = judge(transient, run.outcome().records, dropped, periods)
-        code = run_ends(found.steady, found.rate, dropped, periods, most)
+        verdict = judge(transient, run.outcome().records, dropped, periods)
+        code = run_ends(verdict.steady, verdict.rate, dropped, periods, most)
         if code != codes.LONGER:
-            return Ended(STATUS_OF[code], dropped, found.confidence)
+            return Ended(STATUS_OF[code], dropped, verdict.confidence)
         dropped, periods = periods, 2 * periods
 
 
@@ -229,12 +226,12 @@ def evaluate(
     scene: Scene, run: Outcome, ended: Ended, started: float, observers: Sequence[Observer] = (),
     final: RestartState | None = None,
 ) -> Response:  # fmt: skip
-    """Return the response of a run that began at `started` (time.perf_counter), with what its observers have kept."""
-    found = _sums(scene, run, ended)
+    """Return the response of a run that began at `started` (time.perf_counter), with its observers' data."""
+    results = _sums(scene, run, ended)
     for observer in observers:
-        more = observer.fields(scene, run, found)
-        found |= {**more, "warnings": (*found["warnings"], *more.get("warnings", ()))}
-    return Response(**found, final=final, wall_time_s=time.perf_counter() - started)
+        more = observer.fields(scene, run, results)
+        results |= {**more, "warnings": (*results["warnings"], *more.get("warnings", ()))}
+    return Response(**results, final=final, wall_time_s=time.perf_counter() - started)
 
 
 def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
@@ -250,9 +247,9 @@ def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
     energy = {name: float(value) for name, value in sums["energy"].items()}
     status = closed_status(status, float(sums["unbalanced"]), float(sums["made"]), run.open_ledger)
     if run.plane is not None:
-        found = in_plane_of(run.plane, slice(first, done))
-        status = levelled_status(status, found, run.plane.bound)
-        sums |= found
+        planar = in_plane_of(run.plane, slice(first, done))
+        status = levelled_status(status, planar, run.plane.bound)
+        sums |= planar
     section, b = records.section[: done + 1], system.bodies
     return {
         "status": status, "frequency": scene.frequency, "events": run.events, "classification": class_name(kind),
@@ -267,13 +264,13 @@ def _sums(scene: Scene, run: Outcome, ended: Ended) -> dict[str, Any]:
 
 
 def closed_status(status: Status, imbalance: float, gain: float, bound: float) -> Status:
-    """Return the status of a run by its energies, too: their imbalance, and what impacts and contacts have made."""
+    """Return the status of a run by its energies, too: imbalance, and gains at impacts and contacts."""
     closed = imbalance <= bound and gain <= _MADE
     return Status.ENERGY if not closed and status in _USABLE else status
 
 
 def in_plane(tilt: np.ndarray, lifted: np.ndarray, walls: np.ndarray, neglected: np.ndarray) -> dict[str, np.ndarray]:
-    """Return what quantities need of planar bodies (b, ...), over the evaluated periods; nan for sliders.
+    """Return inputs of quantities of planar bodies (b, ...), over the evaluated periods; nan for sliders.
 
     tilt: largest, rad; lifted: time off the floor, s; walls: impacts on walls; neglected: as of a Plane.
     """
@@ -282,19 +279,19 @@ def in_plane(tilt: np.ndarray, lifted: np.ndarray, walls: np.ndarray, neglected:
 
 
 def in_plane_of(plane: Plane, window: slice) -> dict[str, np.ndarray]:
-    """Return what quantities need of planar bodies (b,), over the evaluated periods."""
+    """Return inputs of quantities of planar bodies (b,), over the evaluated periods."""
     tilt, lifted = plane.tilt[window].max(axis=0, initial=0.0), plane.lifted[window].sum(axis=0)
     return in_plane(tilt, lifted, plane.walls[window].sum(axis=0), plane.neglected)
 
 
-def levelled_status(status: Status, found: Mapping[str, np.ndarray], bound: float) -> Status:
+def levelled_status(status: Status, planar: Mapping[str, np.ndarray], bound: float) -> Status:
     """Return the status of a run by how far planar bodies tilt, too."""
-    tilted = bool(np.any(found["neglected"] * found["tilt"] ** 2 > bound))
+    tilted = bool(np.any(planar["neglected"] * planar["tilt"] ** 2 > bound))
     return Status.TILTED if tilted and status in _USABLE else status
 
 
 def linear_parts(scene: Scene, system: System | None = None, known: Mapping[str, Any] = {}) -> Mapping[str, Any]:
-    """Return the amplitudes without bodies, and with every body fixed in its cavity, m; nan under noise.
+    """Return the amplitudes without bodies, and with bodies fixed, m; nan under noise.
 
     They take a part of the time of a short run: found when they are wanted. known: what else quantities need.
     """
@@ -305,13 +302,13 @@ def linear_parts(scene: Scene, system: System | None = None, known: Mapping[str,
         curve = linear_responses(scene, system)[LINEAR.index(name)]
         return float(curve.amplitude(np.array([scene.frequency]))[0])
 
-    found = Later(LINEAR, amplitude, known)
-    # responses in a list are not to hold large matrices, beside which a run takes long
-    return found if system is None or len(system.mass) <= _LARGE else dict(found)
+    linear = Later(LINEAR, amplitude, known)
+    # lists of responses must not hold large matrices
+    return linear if system is None or len(system.mass) <= _LARGE else dict(linear)
 
 
 def known_value(status: Status, value: Any) -> Any:
-    """Return a quantity as plain data, None for what is not known of a motion; of one that has diverged, nan."""
+    """Return a quantity as plain data, None where unknown; nan if diverged."""
     if np.ndim(value):
         return frozen(value)
     return None if np.isnan(value) and status is not Status.DIVERGED else float(value)
@@ -323,7 +320,7 @@ def residual(ledger: np.ndarray, parts: np.ndarray, exchanged: float = 0.0) -> f
 
 
 def exchanged_energy(system: System, collided: np.ndarray) -> float:
-    """Return the energy that comes and goes within a period, J: in collisions (periods,), and lent by the loads."""
+    """Return the energy exchanged within a period, J: in collisions (periods,), and by the loads."""
     lent = lent_energy(system.load, system.along, system.squares, system.mass, system.frequency, system.omega)
     return max(float(collided.max()), float(lent))
 

@@ -1,6 +1,6 @@
 """The log of a run: the meaning of its rows, and the events in its entries.
 
-An entry has time, kind, row, relative speed before and after, impulse; of bodies in the plane also the impulse of
+An entry has time, kind, row, relative speed before and after, impulse; of planar bodies also the impulse of
 friction and the energy taken.
 """
 
@@ -19,7 +19,7 @@ from vanedamp.coupling.system.system import FLOOR, SURFACES, System
 class Rows(NamedTuple):
     """Meaning of the rows (r,) of a log.
 
-    places: number of the body, or of a stop or friction damper its own; side; corner (-1: none). without_body: (r,)
+    places: number of body, stop or friction damper; side; corner (-1: none). without_body: (r,)
     whether it is the latter. other: (r,) number of the body to the right, -1: none. sign: (r,) of the gap's speed in
     the sign of the body's speed relative to its counterpart.
     spring: (r,) stiffness of a contact, N/m; inf: rigid. restitution: (r,). mass: (r,) largest mass of a collision, kg:
@@ -61,8 +61,8 @@ def _largest_masses(system: System) -> np.ndarray:
     whole = [faces.count(face) for face in faces] * (bodies - turning)
     of_modes = mobility[:, : system.modes].max(axis=1, initial=0.0)
     with np.errstate(divide="ignore"):
-        found: np.ndarray = 1.0 / np.where(bodies > 0.0, np.minimum(bodies, whole), of_modes)
-    return found
+        masses: np.ndarray = 1.0 / np.where(bodies > 0.0, np.minimum(bodies, whole), of_modes)
+    return masses
 
 
 def rows_of_line(system: System) -> Rows:
@@ -82,13 +82,13 @@ def rows_of_line(system: System) -> Rows:
 
 def events_of(rows: Rows, chunks: Sequence[np.ndarray]) -> list[Event]:
     """Return the events of a log, from its chunks of entries (k, LINE_WIDTH or WIDTH)."""
-    found = []
+    events = []
     for moment, kind, row, before, after, *impulses in entries_of(rows, chunks).tolist():
         (body, side, corner), sign = rows.places[int(row)], float(rows.sign[int(row)])
         normal, *others = impulses
         speeds = sign * before + 0.0, sign * after + 0.0
-        found.append(Event(moment, KINDS[int(kind)], body, side, *speeds, normal, corner, *others))
-    return found
+        events.append(Event(moment, KINDS[int(kind)], body, side, *speeds, normal, corner, *others))
+    return events
 
 
 def named_bodies(rows: Rows, chunks: Sequence[np.ndarray], bodies: int) -> np.ndarray:

@@ -24,7 +24,7 @@ from vanedamp.coupling.system.system import System
 #: classes of motion: the number of excitation periods after which it repeats, or
 NON_PERIODIC, NO_CONTACT, STUCK = 0, -1, -2
 
-#: longest period that is looked for, in excitation periods; what it takes to be one
+#: longest period that is looked for, in excitation periods; its criteria
 _LONGEST, _SAME, _REPETITIONS = 16, 1e-6, 8
 #: fraction of the energy there is that counts as flow in any case
 _CARRIED = 1e-3
@@ -32,15 +32,15 @@ _CARRIED = 1e-3
 _NO_SHARE = 1e-9
 #: motions of floors, relative to the response's, that count as zero
 _ROUND_OFF = 1e-12
-#: amplitude of order 1, over the largest displacement that there is, or that the exchanged energy could make, below
+#: amplitude of order 1, over the largest displacement there is, or that the exchanged energy could make, below
 #: which it is round-off
 _STANDS = 1e-12
 _TINY = float(np.finfo(float).tiny)
 
 
 @record_with(free_axes=2)
-class Measured(NamedTuple):
-    """What the figures need of a system (System, whose arrays these are); b bodies, c contacts, e harmonics."""
+class FigureInputs(NamedTuple):
+    """Inputs of figures from a system (System, whose arrays these are); b bodies, c contacts, e harmonics."""
 
     clock: Annotated[np.ndarray, "2"]  # angular frequency of order 1, rad/s, and period, s
     frequency: Annotated[np.ndarray, "e"]  # rad/s
@@ -64,12 +64,12 @@ class Measured(NamedTuple):
     held: Annotated[np.ndarray, "b", bool]  # room for which bodies are at rest
 
 
-def measured_of(scene: Scene, system: System) -> Measured:
-    """Return what the figures need of a scene's system."""
+def measured_of(scene: Scene, system: System) -> FigureInputs:
+    """Return inputs of figures from a scene's system."""
     c, b = system.contacts, system.bodies
     moves = np.abs(system.floor) > _ROUND_OFF * np.abs(system.response).max(initial=0.0)
     excitation = scene.excitation
-    return Measured(
+    return FigureInputs(
         clock=np.array([system.omega, system.period]), frequency=system.frequency, load=system.load,
         table=system.table, squares=system.squares, response=system.response, mass=system.mass, along=system.along,
         holds=system.holds, rest=system.rest, play=system.play, J=system.J, body=system.body, other=system.other,
@@ -92,10 +92,10 @@ def measure(measured, records, first, done, confidence, sums):
     static = static_deflection(records, first, done, period)
     sums[:] = 0.0
     for i in range(first, done):
-        own = distance(records, i, static)
-        sums[PEAK], sums[DISTANCE] = max(sums[PEAK], records.peak[i]), max(sums[DISTANCE], own)
+        swing = distance(records, i, static)
+        sums[PEAK], sums[DISTANCE] = max(sums[PEAK], records.peak[i]), max(sums[DISTANCE], swing)
         sums[PEAKS] += records.peak[i]
-        sums[DISTANCES] += own
+        sums[DISTANCES] += swing
         sums[SQUARE] += records.square[i]
         sums[IMPACTS] += records.impacts[i]
         harmonic += records.harmonic[i]
@@ -193,7 +193,7 @@ def _flow(ledger, parts, done, exchanged):
 
 @strict_entry
 def lent_energy(load, along, squares, mass, frequency, omega):
-    """Return the energy that the loads (e, N) lend within a period, J. Arguments as in Measured."""
+    """Return the energy that the loads (e, N) exchange within a period, J. Arguments as in FigureInputs."""
     lent = 0.0
     for h in range(len(frequency)):
         # the mean of a waveform counts as a slow load
@@ -234,8 +234,8 @@ def _set_scale(measured, section, first, done):
 def _carry(measured, harmonic, count, exchanged, sums):
     """Set the loads on the bodies and their mass; nan where no attached mass is felt.
 
-    A structure that does not move feels none: its harmonic is 0, the remainder of a decayed start, or the round-off of
-    a place where friction holds it against its loads. Of several harmonics, order 1 counts; nothing is known where it
+    A structure at rest has none: its harmonic is 0, the remainder of a decayed start, or the round-off of
+    where friction holds it against its loads. Of several harmonics, order 1 counts; nothing is known where it
     is not excited.
     """
     amplitude = 2.0 / (sums[PERIODS] * sums[SPAN]) * math.hypot(harmonic.real, harmonic.imag)
@@ -253,8 +253,8 @@ def _reach(measured, energy):
     """Return the largest displacement of the response that an energy (J) could make, m; 0 of a prescribed one."""
     yields = 0.0
     for i in range(len(measured.squares)):
-        part = measured.response[i]
-        yields += part * part / max(measured.squares[i], measured.clock[0] * measured.clock[0])
+        weight = measured.response[i]
+        yields += weight * weight / max(measured.squares[i], measured.clock[0] * measured.clock[0])
     return math.sqrt(2.0 * energy * yields)
 
 

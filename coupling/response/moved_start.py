@@ -1,4 +1,4 @@
-"""What a motion owes to its start: bodies that begin as one, and results that hang on the last bits of positions."""
+"""Effects of the start: bodies that begin as one, and results that hang on the last bits of positions."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from vanedamp.coupling.quantities.amplitude import amplitude_mean_confidence, am
 from vanedamp.coupling.quantities.impacts import impacts_per_period
 from vanedamp.coupling.scene.scene import Scene
 
-#: part of the way to other places by which a second run begins elsewhere: of the order of 1e-9 of the free travel
+#: by this part of the way to others a second run begins elsewhere: of the order of 1e-9 of the free travel
 _MOVED = 4e-9
-#: where the first of n of these places is in the free travel, over 1/n: not symmetric
+#: where the first of these n is in the free travel, over 1/n: not symmetric
 _ASIDE = 0.618
 #: distances of neighbours over their free travel that count as contact: at time zero, and in sections
 _TOUCHING, _TOGETHER = 1e-12, 1e-9
 #: quantities of a second run that are kept: those of its Mean first
 KEPT = tuple(one.name for one in (amplitude_mean_dynamic, amplitude_mean_confidence, impacts_per_period))
-#: what has to be equal of neighbours that touch without speed
+#: what must agree of neighbours that touch without speed
 _RATES = ("velocity", "tilt", "tilt_rate")
 
 
@@ -48,45 +48,45 @@ class Mean(NamedTuple):
 
     def sentence(self, other: Mean) -> str:
         """Return how the mean of a run from a moved start differs."""
-        found = f"{other.amplitude:.4g} m" if other.status == self.status else f'"{other.status}"'
+        amplitude = f"{other.amplitude:.4g} m" if other.status == self.status else f'"{other.status}"'
         return (
-            f"the mean amplitude hangs on the last bits of the start: {self.amplitude:.4g} m, but {found} if bodies "
-            f"begin about 1e-9 of their gap aside; damper.N.position as an axis of a sweep shows the states"
+            f"the mean amplitude hangs on the last bits of the start: {self.amplitude:.4g} m, but {amplitude} if "
+            f"bodies begin about 1e-9 of their gap aside; damper.N.position as an axis of a sweep shows the states"
         )
 
 
 def moved(scene: Scene, positions: Sequence[float]) -> list[float]:
     """Return positions of the bodies, m, moved a little, in order and within the free travel: none touches another."""
-    found = list(positions)
+    shifted = list(positions)
     for cavity in scene.cavity:
         row = scene.bodies_in(cavity)
-        for place, number in enumerate(row):
-            aim = cavity.gap * ((place + _ASIDE) / len(row) - 0.5)
-            found[number] += _MOVED * (aim - found[number])
-    return found
+        for index, number in enumerate(row):
+            aim = cavity.gap * ((index + _ASIDE) / len(row) - 0.5)
+            shifted[number] += _MOVED * (aim - shifted[number])
+    return shifted
 
 
 def touching(scene: Scene) -> tuple[str, ...]:
     """Return a warning of neighbours that touch without speed at time zero, where restitution has no effect."""
     bodies, places = scene.damper, scene.positions
-    found = [
+    touched = [
         right
         for left, right, gap in neighbours(scene)
         if places[right] - places[left] <= _TOUCHING * gap
         and all(getattr(bodies[left], rate) == getattr(bodies[right], rate) for rate in _RATES)
     ]
-    what = "touches the body before it at time zero, without relative speed"
-    return _warning(found, what, "can move as one; leave positions out, and the bodies begin apart")
+    reason = "touches the body before it at time zero, without relative speed"
+    return _warning(touched, reason, "can move as one; leave positions out, and the bodies begin apart")
 
 
 def as_one(scene: Scene, slip: np.ndarray, velocity: np.ndarray) -> tuple[str, ...]:
     """Return a warning of neighbours that move, and never part, by their sections (p, b), m and m/s."""
-    found = [
+    bodies = [
         right
         for left, right, gap in neighbours(scene)
         if np.all(np.abs(slip[:, right] - slip[:, left]) <= _TOGETHER * gap) and np.any(velocity[:, [left, right]])
     ]
-    return _warning(found, "never parts from the body before it in the periods evaluated", "move as one")
+    return _warning(bodies, "never parts from the body before it in the periods evaluated", "move as one")
 
 
 def neighbours(scene: Scene) -> Iterator[tuple[int, int, float]]:
@@ -96,10 +96,10 @@ def neighbours(scene: Scene) -> Iterator[tuple[int, int, float]]:
             yield left, right, cavity.gap
 
 
-def _warning(found: Sequence[int], what: str, effect: str) -> tuple[str, ...]:
+def _warning(bodies: Sequence[int], reason: str, effect: str) -> tuple[str, ...]:
     """Return a warning of some bodies, of which the first are named."""
-    if not found:
+    if not bodies:
         return ()
-    named = ", ".join(f"damper[{number}]" for number in found[:4]) + (", ..." if found[4:] else "")
+    named = ", ".join(f"damper[{number}]" for number in bodies[:4]) + (", ..." if bodies[4:] else "")
     why = 'a contact that is closed has no restitution under rigid impacts (law = "compliant" gives it one)'
-    return (f"{named}: {what}: {why}, and they {effect}",)
+    return (f"{named}: {reason}: {why}, and they {effect}",)

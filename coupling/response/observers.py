@@ -1,4 +1,4 @@
-"""What a run may keep beside its sums: samples, the list of events, the wear of its contacts."""
+"""What a run may keep besides its sums: samples, the list of events, the wear of its contacts."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from vanedamp.coupling.scene.scene import Scene
 
 
 def samples(each: int) -> Observer:
-    """Return what keeps equidistant samples of every period: displacements, modal coordinates if the method has any."""
+    """Return the observer of equidistant samples of every period: displacements, any modal coordinates."""
     return Observer(partial(_samples, each), Needs(samples=each))
 
 
-def _samples(kept: int, scene: Scene, run: Outcome, known: Fields) -> Fields:
-    if not kept:
+def _samples(per_period: int, scene: Scene, run: Outcome, known: Fields) -> Fields:
+    if not per_period:
         return {}
     records, each = run.records, run.records.samples_per_period  # others may need more
-    rows = slice(None, run.periods * each, each // kept)
+    rows = slice(None, run.periods * each, each // per_period)
     taken, coordinates, x = records.samples[rows], records.coordinates[rows], records.samples[rows, 0].copy()
-    time = np.arange(len(x)) * (run.system.period / kept)
+    time = np.arange(len(x)) * (run.system.period / per_period)
     made: dict[str, Any] = {"time": time, "displacement": x, "body_displacement": taken[:, 1:].copy()}
     if coordinates.size and np.all(np.isfinite(coordinates)):
         made["coordinates"] = coordinates.copy()
@@ -37,7 +37,7 @@ def _samples(kept: int, scene: Scene, run: Outcome, known: Fields) -> Fields:
 
 
 def wear(scene: Scene) -> Observer:
-    """Return what keeps the work of the contacts of a scene with [wear], exact engine, and their wear."""
+    """Return the observer of contact work of a scene with [wear], exact engine, and their wear."""
     assert scene.wear is not None
     # the energies of impacts on contacts that yield are in the log
     return Observer(_worn, Needs(log=scene.yields, exponent=scene.wear.impact_exponent))
@@ -68,13 +68,13 @@ def contact_work(scene: Scene, run: Outcome, first: int) -> tuple[ContactWork, .
     """Return the work of each contact of a run over its periods from `first` on."""
     records, rows, window = run.records, run.rows, slice(first, run.periods)
     struck = _struck(run)
-    found = []
+    contacts = []
     for row, (number, side, corner) in enumerate(rows.places):
         friction = _friction(scene, run, row)
         sliding = records.worn[window, row] / friction if friction > 0.0 else np.zeros(run.periods - first)
         course = np.stack([sliding, struck[window, row]], axis=1)
-        found.append(ContactWork(number, side, corner, friction, int(records.hits[window, row].sum()), course))
-    return tuple(found)
+        contacts.append(ContactWork(number, side, corner, friction, int(records.hits[window, row].sum()), course))
+    return tuple(contacts)
 
 
 def _struck(run: Outcome) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Further results of bodies in the plane."""
+"""Further results of planar bodies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vanedamp.coupling.system.system import FLOOR, System
 
 
 class Plane(NamedTuple):
-    """Further results of a run with bodies in the plane, of all its periods; b bodies.
+    """Further results of a run with planar bodies, of all its periods; b bodies.
 
     tilt: (periods, b) largest tilt in the cavity, rad; lifted: (periods, b) time off the floor, s; neglected: (b,)
     shortening of a body over the smallest play, per square of its tilt, nan for sliders; bound: of that for a status

@@ -1,4 +1,4 @@
-"""The recorder of all runs: sections and ledger of a period, samples, tilts, and the peak within a step."""
+"""The recorder of all runs: sections and energies of a period, samples, tilts, and the peak within a step."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from vanedamp.coupling.response.records import STORED
 
 @entry
 def record_section(system, records, period, q, v, springs, ledger):
-    """Record section and ledger at the start of a period.
+    """Record section and energies at the start of a period.
 
     q, v: (N,) coordinates and their rates; springs: energy in those of units, J; ledger: (6,) J, whose stored energy is
     set.
     """
-    size, bodies, entry, part = len(q), len(system.along), records.section[period], records.parts[period]
+    size, bodies, entry, energies = len(q), len(system.along), records.section[period], records.parts[period]
     x, rate, momentum, energy = 0.0, 0.0, 0.0, springs
     for i in range(size):
         x += system.response[i] * q[i]
@@ -24,13 +24,13 @@ def record_section(system, records, period, q, v, springs, ledger):
         energy += 0.5 * q[i] * force
     for i in range(system.modes):
         energy += 0.5 * system.mass[i] * v[i] * v[i]
-    part[0] = energy
+    energies[0] = energy
     for b in range(bodies):
         at = system.along[b]
-        part[1 + b] = 0.0
+        energies[1 + b] = 0.0
         for i in range(at, at + (3 if system.tilt[b] >= 0 else 1)):
-            part[1 + b] += 0.5 * system.mass[i] * v[i] * v[i] - system.weight[i] * q[i]
-        energy += part[1 + b]
+            energies[1 + b] += 0.5 * system.mass[i] * v[i] * v[i] - system.weight[i] * q[i]
+        energy += energies[1 + b]
         momentum += system.mass[at] * v[at]
         slip, speed = q[at], v[at]
         for i in range(size):
@@ -126,13 +126,18 @@ def note_step(records, period, h, x0, x1, rate0, rate1):
 def note_outputs(system, records, period, h, q0, v0, q1, v1):
     """Let the further outputs on a step count as `note_step` does; q, v: coordinates and rates at both ends, (N,)."""
     for k in range(records.outputs.shape[1] if period >= records.counted[0] else 0):
-        x0, x1, rate0, rate1, found = 0.0, 0.0, 0.0, 0.0, records.outputs[period, k]
+        x0, x1, rate0, rate1, output = 0.0, 0.0, 0.0, 0.0, records.outputs[period, k]
         for i in range(system.outputs.shape[1]):
-            part = system.outputs[k, i]
-            x0, x1, rate0, rate1 = x0 + part * q0[i], x1 + part * q1[i], rate0 + part * v0[i], rate1 + part * v1[i]
+            weight = system.outputs[k, i]
+            x0, x1, rate0, rate1 = (
+                x0 + weight * q0[i],
+                x1 + weight * q1[i],
+                rate0 + weight * v0[i],
+                rate1 + weight * v1[i],
+            )
         top = cubic_extremum(h, x0, x1, rate0, rate1)
         if len(records.swing) > 0:
-            found[0], found[1] = max(found[0], max(x1, top)), min(found[1], min(x1, top))
-            found[2] += _integral(h, x0, x1, rate0, rate1)
+            output[0], output[1] = max(output[0], max(x1, top)), min(output[1], min(x1, top))
+            output[2] += _integral(h, x0, x1, rate0, rate1)
         else:
-            found[0] = max(found[0], max(abs(x1), abs(top)))
+            output[0] = max(output[0], max(abs(x1), abs(top)))

@@ -12,11 +12,11 @@ from vanedamp.coupling.system.system import System
 
 KINDS = ("impact", "stick", "slip", "detach", "rest")
 IMPACT, STICKS, SLIPS, DETACHES, RESTS = np.arange(len(KINDS))
-#: columns of the log of bodies in the plane, and of the log of sliders
+#: columns of the log of planar bodies, and of the log of sliders
 WIDTH, LINE_WIDTH = 8, 6
 #: entries of the energy balance
 EXCITATION, VISCOUS, FRICTION, IMPACT_LOSS, CONTACT, STORED = range(len(ENERGIES))
-#: rows of a course at first; pieces of a period in it at most, beside one of each segment
+#: rows of a course at first; pieces of a period in it at most, plus one per segment
 _COURSE, MOST_PIECES = 2**16, 4096
 
 
@@ -37,7 +37,7 @@ class Records(NamedTuple):
     coordinates: np.ndarray  # (periods * s, n) modal coordinates there, (., 0): not wanted; first nan: not kept
     tilt: np.ndarray  # (periods + 1, b) largest |tilt| in the cavity, rad
     lifted: np.ndarray  # (periods + 1, b) time off the floor, s
-    walls: np.ndarray  # (periods + 1, b) impacts of bodies in the plane on their walls
+    walls: np.ndarray  # (periods + 1, b) impacts of planar bodies on their walls
     sampled: np.ndarray  # (periods * s, N) all coordinates at the samples, of runs in the plane
     shut: np.ndarray  # (periods * s, u) int: whether contacts are closed there
     log: np.ndarray  # (capacity, WIDTH or LINE_WIDTH) entries of a slice (response.event_log)
@@ -72,8 +72,8 @@ def new_records(
     further outputs are wanted; course: whether their course is.
     """
     b = system.bodies
-    kept = np.empty((periods * samples, system.modes if coordinates else 0))
-    kept[:1] = np.nan  # unused entries of a run that ends early take no memory
+    of_modes = np.empty((periods * samples, system.modes if coordinates else 0))
+    of_modes[:1] = np.nan  # unused entries of a run that ends early take no memory
     rows = 0 if exponent is None else system.bodies + system.dampers + system.contacts
     worn, struck, hits = np.zeros((3, periods + 1, rows))
     return Records(
@@ -82,7 +82,7 @@ def new_records(
         section=np.zeros((periods + 1, 3 + 2 * b)), ledger=np.zeros((periods + 1, len(ENERGIES))),
         parts=np.zeros((periods + 1, 1 + b)), collided=np.zeros(periods + 1),
         samples=np.zeros((periods * samples, 1 + b)),
-        coordinates=kept, tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)),
+        coordinates=of_modes, tilt=np.zeros((periods + 1, b)), lifted=np.zeros((periods + 1, b)),
         walls=np.zeros((periods + 1, b), np.int64),
         sampled=np.zeros((periods * samples, len(system.mass))),
         shut=np.zeros((periods * samples, len(system.rest)), np.int8),

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels, table
+from vanedamp.coupling.quantities.quantity import Quantity, QuantityRecord, labels, table
 from vanedamp.coupling.quantities.sums import OF_MOTION
 from vanedamp.coupling.response.contact_strength import ContactStrength
 from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
@@ -29,7 +29,7 @@ from vanedamp.rom.recovery import COMPONENTS
 _NESTED = ("stress", "strength", "sectors")
 
 
-#: what runs do not have, and why
+#: quantities that runs lack, and why
 _CURVE = "a run has one frequency; the curve of a sweep has peaks"
 NOT_IN_RUNS = {"undamped_top": _CURVE, "fixed_top": _CURVE}
 
@@ -110,7 +110,7 @@ _Angles = Annotated[np.ndarray, Array(("time", "damper"), "rad")]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlanarSamples(Record):
-    """Samples of bodies in the plane at the times of Response.time; lift, tilt and floor_across: nan for sliders."""
+    """Samples of planar bodies at the times of Response.time; lift, tilt and floor_across: nan for sliders."""
 
     body_lift: _OfBodies
     """height of each body's centre above its height flat on its floor"""
@@ -129,13 +129,13 @@ class PlanarSamples(Record):
     contacts: Annotated[tuple[tuple[int, str, int], ...], Own(_written, _contacts)]
     """body, side and corner of each contact, as of an Event: `contact_damper`, `contact_side`, `contact_corner`"""
 
-    def cut(self, kept: Any) -> PlanarSamples:
+    def cut(self, rows: Any) -> PlanarSamples:
         """Return the samples at some of the times, as numpy indexes them."""
-        return replace(self, **{name: getattr(self, name)[kept] for name in declared(type(self)) if name != "contacts"})
+        return replace(self, **{name: getattr(self, name)[rows] for name in declared(type(self)) if name != "contacts"})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Measured, Record, Plotted):
+class Response(QuantityRecord, Record, Plotted):
     """The response of a structure with loose bodies. Amplitudes and energies refer to the evaluated periods.
 
     All quantities that it has are attributes of it, too (docs/reference/results.md); None: it has none.
@@ -248,9 +248,9 @@ class Response(Measured, Record, Plotted):
     def shown(self) -> dict[str, Any]:
         """Return the values that are printed, by name."""
         left_out = ("quantities", "scene", "provenance")
-        found = {name: value for name, value in super().shown().items() if name not in left_out}
-        first = {name: found.pop(name) for name in ("status", "frequency")}
-        return first | self._plain | found
+        values = {name: value for name, value in super().shown().items() if name not in left_out}
+        first = {name: values.pop(name) for name in ("status", "frequency")}
+        return first | self._plain | values
 
     def printed_units(self) -> dict[str, str]:
         """Return the units of the results that have one, by name."""
@@ -258,16 +258,16 @@ class Response(Measured, Record, Plotted):
 
     def to_json(self, events: bool = False) -> dict[str, Any]:
         """Return the result as plain data, with the list of events if wanted."""
-        found = super().to_json()
-        found = {name: found.pop(name) for name in ("status", "frequency", *self._plain)} | found
+        data = super().to_json()
+        data = {name: data.pop(name) for name in ("status", "frequency", *self._plain)} | data
         if not events:
-            return found
+            return data
         planar = () if self.tilt_max is not None else ("corner", "tangential_impulse", "loss")
         listed = [{k: v for k, v in asdict(event).items() if k not in planar} for event in self.event_list]
-        return found | {"event_list": listed}
+        return data | {"event_list": listed}
 
     def derived(self) -> dict[str, Any]:
-        """Return what only some runs have."""
+        """Return data of some runs only."""
         names = ("moved_start", "estimate", "advice", "wear", "contacts", "lyapunov")
         data = {name: value for name, value in self.plain(names).items() if value is not None}
         data |= {name: _listed(table()[name], value) for name, value in self._plain.items()}
@@ -298,9 +298,9 @@ class Response(Measured, Record, Plotted):
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
-        own = {name: value for name, value in self.derived().items() if name in _NESTED}
-        own |= {name: value for name, value in self._plain.items() if value is not None}
-        return super().attributes() | own | {"provenance": self._made(), "warnings": list(self.warnings)}
+        facts = {name: value for name, value in self.derived().items() if name in _NESTED}
+        facts |= {name: value for name, value in self._plain.items() if value is not None}
+        return super().attributes() | facts | {"provenance": self._made(), "warnings": list(self.warnings)}
 
     @classmethod
     def of(cls, values: Mapping[str, Any], attributes: Mapping[str, Any], path: str = "") -> Response:
@@ -311,10 +311,10 @@ class Response(Measured, Record, Plotted):
         given = cls.given(earlier | dict(values), attributes, path)
         scene = given["provenance"].pop("scene", None)
         nested = {name: json.loads(attributes[name]) for name in _NESTED if name in attributes}
-        kept = [name for name, one in table().items() if not one.exists(cls.__dataclass_fields__)]
-        quantities = {name: None for name in kept if table()[name].exists(OF_MOTION)} | {
+        names = [name for name, one in table().items() if not one.exists(cls.__dataclass_fields__)]
+        quantities = {name: None for name in names if table()[name].exists(OF_MOTION)} | {
             name: float(value) if np.ndim(value := attributes[name]) == 0 else frozen(value)
-            for name in kept
+            for name in names
             if name in attributes
         }
         return cls(

@@ -9,7 +9,7 @@ import numpy as np
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
-from vanedamp.coupling.system.assembly import Motion, place_sliders
+from vanedamp.coupling.system.assembly import Coordinates, place_sliders
 from vanedamp.coupling.system.modal_basis import transfer_of
 from vanedamp.coupling.system.reduced_model_file import greatest_speed
 from vanedamp.coupling.system.system import SURFACES, System
@@ -46,14 +46,14 @@ def fitted(system: System, state: RestartState) -> RestartState:
     return _inside(system, replace(state, elongation=frozen(np.clip(state.elongation, -most, most))))
 
 
-def motion_of(system: System, state: RestartState) -> Motion:
+def motion_of(system: System, state: RestartState) -> Coordinates:
     """Return the coordinates (N,) of a state, and their rates."""
     n = system.modes
     parts = (
         (state.displacement, state.slip, state.lift, state.tilt),
         (state.velocity, state.slip_velocity, state.lift_velocity, state.tilt_rate),
     )
-    motion = Motion(*np.zeros((2, len(system.mass))))
+    motion = Coordinates(*np.zeros((2, len(system.mass))))
     for q, (structure, slip, lift, tilt) in zip(motion, parts, strict=True):
         q[:n] = structure / system.scale
         floor, rise, turn = system.floor @ q, system.rise @ q, system.turn @ q
@@ -65,7 +65,7 @@ def motion_of(system: System, state: RestartState) -> Motion:
     return motion
 
 
-def state_at(system: System, motion: Motion) -> RestartState:
+def state_at(system: System, motion: Coordinates) -> RestartState:
     """Return the state of coordinates (N,) and their rates."""
     n, extended = system.modes, system.tilt >= 0
     elongation = np.zeros(system.dampers)
@@ -100,8 +100,8 @@ def _of_scene(scene: Scene, system: System) -> RestartState:
         [damper.lift_velocity for damper in bodies],
         [damper.tilt for damper in bodies], [damper.tilt_rate for damper in bodies],
     )  # fmt: skip
-    kept = frozen if active() is None else array
-    return RestartState(*map(kept, (*parts, *(across if system.in_plane else ()))))
+    convert = frozen if active() is None else array
+    return RestartState(*map(convert, (*parts, *(across if system.in_plane else ()))))
 
 
 def _checked(system: System, state: RestartState) -> RestartState:
@@ -120,13 +120,13 @@ def _check_size(system: System, state: RestartState) -> None:
     """Raise InputError for a state of a scene of another size, or of other bodies."""
     n, b = system.modes, system.bodies
     sizes = (n, n, b, b, system.dampers, *4 * (b if system.in_plane else 0,))
-    found = tuple(len(getattr(state, entry.name)) for entry in fields(state) if entry.name not in ("gap", "speed"))
-    if found[:5] != sizes[:5]:
+    counts = tuple(len(getattr(state, entry.name)) for entry in fields(state) if entry.name not in ("gap", "speed"))
+    if counts[:5] != sizes[:5]:
         raise InputError(
-            f"continuation: a state of {found[0]} modes, {found[2]} bodies and {found[4]} friction dampers does not "
+            f"continuation: a state of {counts[0]} modes, {counts[2]} bodies and {counts[4]} friction dampers does not "
             f"fit a scene of {n}, {b} and {system.dampers}"
         )
-    if found != sizes:
+    if counts != sizes:
         raise InputError(
             "continuation: a state of bodies that move in the plane, with extent, stiffness or dashpot, and one of "
             "sliders do not fit each other's scenes"

@@ -8,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, family
+from vanedamp.coupling.quantities.quantity import Quantity, QuantityRecord, family
 from vanedamp.coupling.quantities.sectors import OF_SECTORS
 from vanedamp.files.store import frozen
 from vanedamp.modal.algebra import first_largest
 
-#: what each sector has, by the names of a run's
+#: values of each sector, by the names of a run's
 BY_SECTOR = tuple(one.name for one in OF_SECTORS)
 
 
 @dataclass(frozen=True, eq=False)
-class SectorResponse(Measured):
+class SectorResponse(QuantityRecord):
     """Response of N sectors of a ring over the evaluated periods of a run.
 
     quantities      (N,) by BY_SECTOR, attributes as well: mean and largest of the periods' largest distances of
                     `excitation.at` from the static deflection, m; amplitudes of the linear ring without bodies, and
-                    with every body fixed to its floor, nan for an excitation that is no sum of sines; impacts per
+                    with bodies fixed, nan for an excitation that is no sum of sines; impacts per
                     period of the sector's bodies, nan for a method that does not count them
     sampling_error  0: amplitudes come from no samples
     tuned           m, of the tuned ring without bodies at its resonance near the excitation, at `excitation.at`; None:
@@ -36,7 +36,7 @@ class SectorResponse(Measured):
 
     @classmethod
     def of(cls, values: Mapping[str, Any], data: Mapping[str, Any]) -> SectorResponse:
-        """Return the record in the variables of a file, and in what `to_json` gives."""
+        """Return the record for a file, and for `to_json`."""
         arrays = {name: frozen(values[f"sector_{name}"]) for name in BY_SECTOR}
         return cls(arrays, sampling_error=data.get("sampling_error", 0.0), tuned=data["tuned"])
 
@@ -46,13 +46,13 @@ class SectorResponse(Measured):
         return first_largest(self.amplitude_mean)
 
     def __getattr__(self, name: str) -> Any:
-        """Return what each sector has, or the whole ring by them."""
+        """Return the sectors' values, or the ring's by them."""
         ring = _of_ring()
         return ring[name].formula(self) if name in ring else super().__getattr__(name)
 
     @property
     def sentence(self) -> str:
-        """What the record says, in a line."""
+        """The record in a line."""
         number, count = self.largest, len(self.amplitude_mean)
         text = f"largest amplitude {1e6 * self.amplitude_mean[number]:.4g} um in sector {number} of {count}"
         if self.amplification is not None:

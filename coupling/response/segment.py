@@ -28,7 +28,7 @@ from vanedamp.coupling.system.system import System
 _SMALL = 0.1
 
 
-class Event(NamedTuple):
+class SegmentEnd(NamedTuple):
     """End of a segment; u units.
 
     unit: number of the unit at which it happens, -1: the end of an excitation period, or the start of the run
@@ -56,7 +56,7 @@ class Segment(NamedTuple):
     period, time: number of its excitation period, and its start within that, s; duration: s; event: at its end
     state: (u,) of the units (numerics.codes). A contact is OPEN, LEAVING (it has ended before its gap is open),
     TOUCHING (closed without a force of its own) or closed with a force: CLOSED, SPRUNG (a spring), or, where the engine
-    tells its friction, STICK, SLIP_LEFT or SLIP_RIGHT. A friction element has the last three, or HELD (at rest, by the
+    sets its friction, STICK, SLIP_LEFT or SLIP_RIGHT. A friction element has the last three, or HELD (at rest, by the
     force of others)
     q, v, bend: (N,) coordinates, their rates and constant accelerations at its start; speed: the fastest in the scene,
     m/s, to which the round-off of others is relative
@@ -84,7 +84,7 @@ class Segment(NamedTuple):
     driver: np.ndarray
     open_force: np.ndarray
     duration: float = np.nan
-    event: Event | None = None
+    event: SegmentEnd | None = None
 
     @property
     def start(self) -> float:
@@ -143,7 +143,7 @@ START = Begun()
 
 
 class EventRun(Run, Protocol):
-    """A run of an engine, which knows its motion between events. It must keep its events, and ends at `max_events`."""
+    """A run of an engine, with its motion between events. It must keep its events, and ends at `max_events`."""
 
     whole: System
     records: Records
@@ -165,26 +165,26 @@ class EventRun(Run, Protocol):
     def segment(self) -> Segment:
         """Return the motion from the present state on, which has been set up; its end is open."""
 
-    def event(self) -> tuple[float, Event]:
+    def event(self) -> tuple[float, SegmentEnd]:
         """Return the last event and the time since the last `segment`, s; before the first, the start of the run."""
 
     def reuse(self, earlier: Any) -> None:
-        """Take over what an earlier run of the same engine has computed, as far as its system is the same."""
+        """Reuse what an earlier run of the same engine has computed, as far as its system is the same."""
 
 
-def no_event(system: System) -> Event:
+def no_event(system: System) -> SegmentEnd:
     """Return the end of an excitation period, at which nothing happens."""
     none, nobody = np.zeros(len(system.J)), np.zeros(0)
-    return Event(-1, 0, none, none, nobody.astype(int), nobody, nobody)
+    return SegmentEnd(-1, 0, none, none, nobody.astype(int), nobody, nobody)
 
 
 class Walk:
     """A run from segment to segment, to the end of `periods`.
 
-    start: what happens at time zero, once the first segment is known; status: how the walk ended.
+    start: events at time zero, once the first segment is known; status: how the walk ended.
     """
 
-    start: Event
+    start: SegmentEnd
 
     def __init__(self, run: EventRun, periods: int) -> None:
         self.run, self.status = run, Status.OK

@@ -29,12 +29,12 @@ class SpotStress:
     mean                    (6,) mean of the motion, which static loads of the bodies deflect
     static                  (6,) that and the stress of rotation and temperature; None: unknown
     undamped, fixed         amplitudes "von_mises" and "principal" of the linear structure without bodies, and with
-                            every body fixed to its floor; None for an excitation that is no sum of sines
+                            bodies fixed; None for an excitation that is no sum of sines
     fatigue                 data of the material, such as "strength", Pa
     strength                utilisation and life, by the names of strength.assessment; empty without a fatigue strength
     samples_per_period      from which the amplitudes are taken
     sampling_error          change of von Mises amplitudes by leaving out every other sample, relative: an upper bound
-                            for the error of all of them, where stress is smooth
+                            for the error of all, where stress is smooth
     mesh_error              estimated relative error by the mesh; None: not known
     """
 
@@ -59,7 +59,7 @@ class SpotStress:
 
     @classmethod
     def of(cls, name: str, data: Mapping[str, Any], strength: Mapping[str, Any]) -> SpotStress:
-        """Return the record of `to_json`, with the strength beside it."""
+        """Return the record of `to_json`, and the strength."""
         given = {key: value for key, value in data.items() if key != "strength_fraction"}
         for key in ("amplitude", "amplitude_max", "mean", "static"):  # a file has the components by their names' order
             given[key] = given[key] and {component: given[key][component] for component in COMPONENTS}
@@ -75,21 +75,21 @@ class SpotStress:
 
     @property
     def sentence(self) -> str:
-        """Place and amplitude in words."""
-        place = "" if self.coordinates is None else " at ({:.4g}, {:.4g}, {:.4g}) m".format(*self.coordinates)
+        """Position and amplitude in words."""
+        at = "" if self.coordinates is None else " at ({:.4g}, {:.4g}, {:.4g}) m".format(*self.coordinates)
         inside, share = f" in {self.group}" if self.group else "", self.strength_fraction
         level = "" if share is None else f", {share:.3g} of the fatigue strength"
         mesh = "" if self.mesh_error is None else f" (+- {100.0 * self.mesh_error:.2g} % by the mesh)"
-        return f"{self.name}{place}{inside}: {self.von_mises / 1e6:.4g} MPa{mesh}{level}{self._life}"
+        return f"{self.name}{at}{inside}: {self.von_mises / 1e6:.4g} MPa{mesh}{level}{self._life}"
 
     @property
     def _life(self) -> str:
         """Utilisation by the line of mean stress and life, in words; nothing where there is neither."""
-        found, words = self.strength, ""
-        if found and found["mean_line"] != "none":
-            about = f"{found['mean_line'].capitalize()}, mean stress {found['mean'] / 1e6:.4g} MPa"
-            words = f", utilisation {found['utilisation']:.3g} ({about})"
-        return words + (f", median life {found['life_hours']['50%']:.3g} h" if "life_hours" in found else "")
+        strength, words = self.strength, ""
+        if strength and strength["mean_line"] != "none":
+            about = f"{strength['mean_line'].capitalize()}, mean stress {strength['mean'] / 1e6:.4g} MPa"
+            words = f", utilisation {strength['utilisation']:.3g} ({about})"
+        return words + (f", median life {strength['life_hours']['50%']:.3g} h" if "life_hours" in strength else "")
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain data, components by name."""

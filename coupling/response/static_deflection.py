@@ -19,7 +19,7 @@ def deflects(scene: Scene, system: System) -> bool:
     extended = np.flatnonzero(system.tilt >= 0)
     pressed = np.zeros(system.bodies)
     pressed[extended] = system.weight[system.along[extended] + 1]
-    arm = np.array([scene.cavity[place].gap for place in system.cavity])
+    arm = np.array([scene.cavity[name].gap for name in system.cavity])
     functionals = np.vstack([system.floor[:, :n], system.rise[:, :n], system.turn[:, :n]])
     loads = np.concatenate([system.of_bodies.weight, pressed, pressed * arm])
     yields = np.abs(modes.response) / np.where(modes.stiffness > 0.0, modes.stiffness, np.inf)

@@ -38,7 +38,7 @@ _SLOW = 0.7
 _LONGEST = 16
 #: relaxations within the longest run below which an open one ends
 _HOPELESS = 3.0
-#: periods between two looks at whether the mean is known (steady = "auto")
+#: periods between checks of the mean (steady = "auto")
 LOOK = 100
 #: smallest fraction of a decay
 _TINY = float(np.finfo(float).tiny)
@@ -70,7 +70,7 @@ def judged(setup, free, stuck, records, first, done, peaks):
     moves = False
     for i in range(n):
         moves = moves or peaks[i] != 0.0
-    # a motion that nothing excites is what was asked for, whatever is left of it
+    # without excitation any motion is accepted
     if (
         not (moves and (setup.driven or setup.excited[0]))
         or (left <= tolerance and not _touched(setup, records, ZERO, done))
@@ -87,19 +87,19 @@ def judged(setup, free, stuck, records, first, done, peaks):
     given = left <= tolerance and not setup.open
     repeats = remaining <= (_ROOM * allowed if given else allowed) and (given or n >= beat)
     relaxations = rate * n
-    own = confidence_of(peaks, ZERO, n, np.inf if repeats else relaxations)
+    confidence = confidence_of(peaks, ZERO, n, np.inf if repeats else relaxations)
     if quiet or repeats:
-        return repeats, rate, own + (remaining if repeats else 0.0)
+        return repeats, rate, confidence + (remaining if repeats else 0.0)
     # neighbouring parts of the window must not be too much alike for statistics, beyond the tolerance of its mean
-    slow = own > allowed and lag_correlation(peaks, ZERO, n) > _SLOW
+    slow = confidence > allowed and lag_correlation(peaks, ZERO, n) > _SLOW
     mixed = relaxations >= (_GIVEN if given else _RELAXATIONS) and (given or not slow)
     enough = left <= tolerance or n >= 2 * _BATCHES * _SHORTEST
-    return mixed and enough and not _drifts(peaks, n, allowed), rate, own
+    return mixed and enough and not _drifts(peaks, n, allowed), rate, confidence
 
 
 @strict_entry
 def run_ends(steady, rate, dropped, periods, most):
-    """Return how a run goes on that was judged after its periods: DONE, NOT_STEADY or LONGER, for as long again."""
+    """Return how a run continues that was judged after its periods: DONE, NOT_STEADY or LONGER, for as long again."""
     if steady or dropped == 0:
         return DONE
     return NOT_STEADY if 2 * periods > most or rate * most < _HOPELESS else LONGER
@@ -167,15 +167,15 @@ def _remaining(peaks, n, rate, tolerance):
     for i in range(n - parts * size, n, size):
         mean = mean_of(peaks, i, i + size)
         least, most = min(least, mean), max(most, mean)
-    found = (most - least) / _gone(rate * (n - size), tolerance)
+    remaining = (most - least) / _gone(rate * (n - size), tolerance)
     for period in range(1, min(_LONGEST, n // 2) + 1):
         gone, change = _gone(rate * period, 0.0), 0.0
         for i in range(period, n):
             change = max(change, abs(peaks[i] - peaks[i - period]))
-            if change >= found * gone:
+            if change >= remaining * gone:
                 break
-        found = min(found, change / gone)
-    return found
+        remaining = min(remaining, change / gone)
+    return remaining
 
 
 @strict

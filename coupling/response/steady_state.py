@@ -57,8 +57,8 @@ def transient_length(series, n):
 
 def mean_confidence(series: np.ndarray) -> float | None:
     """Return the half width of the 95 % confidence interval of a steady-state series' mean; None if it is too short."""
-    found = confidence_of(series, 0, len(series), np.inf)
-    return None if np.isnan(found) else float(found)
+    confidence = confidence_of(series, 0, len(series), np.inf)
+    return None if np.isnan(confidence) else float(confidence)
 
 
 @strict_entry
@@ -80,12 +80,12 @@ def confidence_of(series, first, done, relaxations):
 
 @strict_entry
 def student_quantile(freedom):
-    """Return what Student's t of 1 to 9 degrees of freedom exceeds with probability 2.5 %, to 1e-15 of it."""
-    place = 2.5 - 4.5 / freedom  # twice that of the polynomials, from -2 to 2
+    """Return the 97.5 % quantile of Student's t of 1 to 9 degrees of freedom, to 1e-15 of it."""
+    x = 2.5 - 4.5 / freedom  # twice that of the polynomials, from -2 to 2
     value, before = 0.0, 0.0
     for i in range(len(_QUANTILE) - 1, 0, -1):
-        value, before = _QUANTILE[i] + place * value - before, value
-    return _QUANTILE[0] + 0.5 * place * value - before
+        value, before = _QUANTILE[i] + x * value - before, value
+    return _QUANTILE[0] + 0.5 * x * value - before
 
 
 @strict
@@ -98,10 +98,10 @@ def lag_correlation(series, first, done):
     begin = done - size * count
     middle, square, product, before = mean_of(series, begin, done), 0.0, 0.0, 0.0
     for i in range(count):
-        own = mean_of(series, begin + i * size, begin + (i + 1) * size) - middle
-        square += own * own
-        product += own * before
-        before = own
+        mean = mean_of(series, begin + i * size, begin + (i + 1) * size) - middle
+        square += mean * mean
+        product += mean * before
+        before = mean
     if not square > 0.0:
         return 0.0
     # of n independent values the estimate is -1/n on average, and 1 - 3/n of it for correlated ones (Marriott and Pope)

@@ -2,7 +2,7 @@
 
 Sliding wears by Archard's law (J. F. Archard, J. Appl. Phys. 24, 981, 1953): the volume is K/H times the integral of
 normal force times slip speed, which the engines accumulate exactly. Impacts add `impact_rate` times the sum of their
-energies, each to the power n. Both partners lose their share of the volume.
+energies, each to the power n. Each partner loses its part of the volume.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _SAME = 1e-9
 ALONG, ACROSS = ("left", "right", "body"), ("floor", "ceiling")
 
 
-class Patch(NamedTuple):
-    """Rates of a contact and its patch: sliding 1/Pa, impact m^3/J^n, share of the cavity, area m^2 (None: unknown)."""
+class WornPatch(NamedTuple):
+    """Rates of a contact and its patch: sliding 1/Pa, impact m^3/J^n, part of the cavity, area m^2 (None: unknown)."""
 
     sliding: float
     impact: float
@@ -40,7 +40,7 @@ def contact_wear(scene: Scene, work: Sequence[ContactWork]) -> tuple[ContactWear
     return tuple(_wear(one, patch, per_hour) for one, patch in zip(work, patches(scene, work), strict=True))
 
 
-def _wear(one: ContactWork, patch: Patch, per_hour: float) -> ContactWear:
+def _wear(one: ContactWork, patch: WornPatch, per_hour: float) -> ContactWear:
     """Return the wear of a contact; per_hour: periods in an hour."""
     volumes = one.course @ (patch.sliding, patch.impact)
     volume, confidence = per_hour * float(volumes.mean()), mean_confidence(volumes)
@@ -65,14 +65,14 @@ def ledger_warning(work: Sequence[ContactWork], friction: float) -> tuple[str, .
     return (f"wear: friction work by wear volumes and by the energy balance differ by {gap:.1e} of it",)
 
 
-def patches(scene: Scene, work: Sequence[ContactWork]) -> list[Patch]:
+def patches(scene: Scene, work: Sequence[ContactWork]) -> list[WornPatch]:
     """Return the rates and patch of every contact."""
     assert scene.wear is not None
     places = [(one.damper, one.side) for one in work]
     return [_patch(scene, scene.wear, *place, places.count(place)) for place in places]
 
 
-def _patch(scene: Scene, wear: Wear, damper: int, side: str, corners: int) -> Patch:
+def _patch(scene: Scene, wear: Wear, damper: int, side: str, corners: int) -> WornPatch:
     tables: list[WearRates] = [
         pair for pair in reversed(wear.pair) if pair.damper in (None, damper) and pair.side in (None, side)
     ]
@@ -88,7 +88,7 @@ def _patch(scene: Scene, wear: Wear, damper: int, side: str, corners: int) -> Pa
             area = edge * wear.width
         elif extent:
             area = extent * wear.width / corners
-    return Patch(first("sliding_rate", 0.0), first("impact_rate", 0.0), first("share", 0.5), area)
+    return WornPatch(first("sliding_rate", 0.0), first("impact_rate", 0.0), first("share", 0.5), area)
 
 
 def _extent(wear: Wear, body: Damper, side: str) -> float | None:
@@ -102,7 +102,7 @@ def _extent(wear: Wear, body: Damper, side: str) -> float | None:
 def opening(scene: Scene, places: Sequence[tuple[int, str]]) -> tuple[np.ndarray, np.ndarray]:
     """Return how depths of wear (c,), m, of both partners, open the cavities: matrices (cavities, c) of gap and play.
 
-    places: body and side of every contact. A face wears by the mean of its contacts, whatever the share of the cavity;
+    places: body and side of every contact. A face wears by the mean of its contacts, whatever its part of the cavity;
     of the floors and ceilings of several bodies in a cavity the mean counts.
     """
     along, across = (np.zeros((len(scene.cavity), len(places))) for _ in range(2))
@@ -119,7 +119,7 @@ def opening(scene: Scene, places: Sequence[tuple[int, str]]) -> tuple[np.ndarray
 
 
 def body_shares(scene: Scene, contacts: Sequence[Any]) -> np.ndarray:
-    """Return the shares (bodies, c) of the volumes of contacts (with damper, side and share) that each body loses."""
+    """Return the fractions (bodies, c) of volumes of contacts (with damper, side and share) that each body loses."""
     shares = np.zeros((len(scene.damper), len(contacts)))
     for contact, one in enumerate(contacts):
         if one.side in ALONG + ACROSS:

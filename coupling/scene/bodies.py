@@ -92,7 +92,7 @@ def _known_shape(name: str) -> str:
 
 
 class _Measures(NamedTuple):
-    """What a shape asks of its body (shapes.shape.Measured)."""
+    """What a shape asks of its body (shapes.shape.BodyMeasures)."""
 
     mass: float
     lengths: Mapping[str, float | None]
@@ -214,8 +214,8 @@ class Damper(OpenRecord):
     @property
     def half_extent(self) -> tuple[float, float]:
         """Half the length and half the height, m; 0 where a slider has none."""
-        found: tuple[float, float] = self.shaped("half_extent")
-        return found
+        extents: tuple[float, float] = self.shaped("half_extent")
+        return extents
 
     @property
     def moment_of_inertia(self) -> float:
@@ -236,7 +236,11 @@ def spread(given: Sequence[Any], gap: Any) -> list[Any]:
 
     given: from left to right, None for a body with equal gaps to its neighbours; gap: free travel, m.
     """
-    marks = [(-1, -0.5), *((n, place / gap) for n, place in enumerate(given) if place is not None), (len(given), 0.5)]
+    marks = [
+        (-1, -0.5),
+        *((n, position / gap) for n, position in enumerate(given) if position is not None),
+        (len(given), 0.5),
+    ]
     places = list(given)
     for (first, low), (last, high) in itertools.pairwise(marks):
         for n in range(first + 1, last):

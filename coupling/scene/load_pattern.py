@@ -39,10 +39,10 @@ class Load:
 def repeated(loads: Mapping[str, Load]) -> str | None:
     """Return why loads, by their places, do not go together: two of one order at one label; None if they do."""
     seen: dict[tuple[str, int], str] = {}
-    for place, load in loads.items():
-        first = seen.setdefault((load.at, load.order), place)
-        if first != place:
-            return f"{place}: order {load.order} at '{load.at}' is given twice; orders at one label must differ"
+    for key, load in loads.items():
+        first = seen.setdefault((load.at, load.order), key)
+        if first != key:
+            return f"{key}: order {load.order} at '{load.at}' is given twice; orders at one label must differ"
     return None
 
 

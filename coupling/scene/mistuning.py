@@ -100,7 +100,7 @@ class Mistuning:
         """
         from vanedamp.rom.ring.deviations import Deviations
 
-        found: dict[str, np.ndarray | None] = {"stiffness": None, "mass": None, "damping": None}
+        changes: dict[str, np.ndarray | None] = {"stiffness": None, "mass": None, "damping": None}
         for number, name in enumerate(DEVIATIONS):
             given: Deviation | None = getattr(self, name)
             if given is None:
@@ -112,10 +112,10 @@ class Mistuning:
                     "relative, above -1"
                 )
             if name == "frequency":
-                found["stiffness"] = (1.0 + values) ** 2 - 1.0
+                changes["stiffness"] = (1.0 + values) ** 2 - 1.0
             else:
-                found[name] = values
-        return Deviations(**found)
+                changes[name] = values
+        return Deviations(**changes)
 
 
 class _Measured(NamedTuple):
@@ -130,18 +130,18 @@ def _measured(file: str, sectors: int, key: str, _stamp: int) -> _Measured:
     """Return the deviations in a CSV file. Raises InputError."""
     frequencies = any("frequency_hz" in header for _, header in csv_table(file, InputError)[:1])
     column = "frequency_hz" if frequencies else "deviation"
-    found: dict[int, float] = {}
+    by_sector: dict[int, float] = {}
     for row in read_csv(file, ("sector", column)):
         sector, value = row.number("sector"), row.number(column)
         if not 0 <= sector < sectors or sector != int(sector):
             raise InputError(f"{row.place}: sector: expected a whole number from 0 to {sectors - 1} (got {sector:g})")
-        if int(sector) in found:
+        if int(sector) in by_sector:
             raise InputError(f"{row.place}: sector: {int(sector)} is given twice")
         if frequencies and not value > 0.0:
             raise InputError(f"{row.place}: frequency_hz: expected a number above 0 (got {value:g})")
-        found[int(sector)] = value
-    missing = [sector for sector in range(sectors) if sector not in found]
+        by_sector[int(sector)] = value
+    missing = [sector for sector in range(sectors) if sector not in by_sector]
     if missing:
         raise InputError(f"{key}.file: {file}: sector {missing[0]} is missing; expected all of 0 to {sectors - 1}")
-    values = np.array([found[sector] for sector in range(sectors)])
+    values = np.array([by_sector[sector] for sector in range(sectors)])
     return _Measured(tuple((values / values.mean() - 1.0 if frequencies else values).tolist()), frequencies)

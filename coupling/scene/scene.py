@@ -36,15 +36,7 @@ from vanedamp.files.display import Displayed
 from vanedamp.files.key_tables import documented
 from vanedamp.files.open_record import OpenRecord
 from vanedamp.files.store import replacing
-from vanedamp.files.toml_input import (
-    STRICT,
-    InputError,
-    Real,
-    Whole,
-    nearest,
-    read_toml,
-    tables,
-)
+from vanedamp.files.toml_input import STRICT, InputError, Real, Whole, nearest, read_toml, tables
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -309,12 +301,12 @@ class Scene(OpenRecord, Displayed):
     @property
     def positions(self) -> list[float]:
         """Positions of the bodies at time zero relative to their cavities, m: those given, the others spread."""
-        found = [0.0] * len(self.damper)
+        positions = [0.0] * len(self.damper)
         for cavity in self.cavity:
             row = self.bodies_in(cavity)
-            for number, place in zip(row, spread([self.damper[n].position for n in row], cavity.gap), strict=True):
-                found[number] = place
-        return found
+            for number, position in zip(row, spread([self.damper[n].position for n in row], cavity.gap), strict=True):
+                positions[number] = position
+        return positions
 
     @property
     def yields(self) -> bool:
@@ -477,13 +469,13 @@ class Scene(OpenRecord, Displayed):
         """Raise ValueError for contacts with rates of their own that the scene has not."""
         counts = {"casing": len(self.friction_damper), "stop": len(self.stop)}
         for number, pair in enumerate(() if self.wear is None else self.wear.pair):
-            what = {"casing": "friction dampers", "stop": "stops"}.get(pair.side or "", "bodies")
+            owners = {"casing": "friction dampers", "stop": "stops"}.get(pair.side or "", "bodies")
             count = counts.get(pair.side or "", len(self.damper))
             if pair.side is None:
                 count = max(count, *counts.values())
             if pair.damper is not None and pair.damper >= count:
                 raise ValueError(
-                    f"wear.pair[{number}].damper: there are only {count} {what}, counted from 0 (got {pair.damper})"
+                    f"wear.pair[{number}].damper: there are only {count} {owners}, counted from 0 (got {pair.damper})"
                 )
 
     def _check_ranges(self) -> None:
@@ -551,19 +543,19 @@ class Scene(OpenRecord, Displayed):
 
         data = self.to_dict()
         if isinstance(self.structure, Rom) and in_memory.is_temporary(self.structure.file):
-            own = Path(path).with_name(f"{Path(path).stem}_rom.h5")
-            with replacing(own) as temporary:
+            rom = Path(path).with_name(f"{Path(path).stem}_rom.h5")
+            with replacing(rom) as temporary:
                 copyfile(self.structure.file, temporary)
-            data["structure"]["file"] = str(own)
+            data["structure"]["file"] = str(rom)
         with replacing(path) as temporary:
             temporary.write_text(toml(relative(data, path)), encoding="utf-8")
 
     @property
     def files(self) -> list[str]:
         """The files that the scene and its sweep name."""
-        own = [table[key] for table, key in _named_files(self.to_dict())]
+        named = [table[key] for table, key in _named_files(self.to_dict())]
         swept = [self.axes.get(path, ()) for path in FILE_PATHS]
-        return own + [str(file) for files in swept if not isinstance(files, Range) for file in files]
+        return named + [str(file) for files in swept if not isinstance(files, Range) for file in files]
 
     @property
     def axes(self) -> dict[str, Range | tuple[Any, ...]]:
@@ -613,8 +605,8 @@ class Scene(OpenRecord, Displayed):
         data: its plain data, where they are known: positions are set there.
         """
         data = self.to_dict() if data is None else data
-        for body, place in zip(data.get("damper", ()), self.positions, strict=True):
-            body["position"] = place
+        for body, position in zip(data.get("damper", ()), self.positions, strict=True):
+            body["position"] = position
         return number_at(data, path)
 
     def replace(self, values: Mapping[str, Any]) -> Scene:
@@ -638,12 +630,12 @@ class Scene(OpenRecord, Displayed):
 
 def _named_files(data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
     """Yield the tables of a scene that name a file, each with its key."""
-    for place in _FILES:
+    for keys in _FILES:
         table: Any = data
-        for step in place[:-1]:
+        for step in keys[:-1]:
             table = table.get(step) if isinstance(table, dict) else None
-        if isinstance(table, dict) and isinstance(table.get(place[-1]), str):
-            yield table, place[-1]
+        if isinstance(table, dict) and isinstance(table.get(keys[-1]), str):
+            yield table, keys[-1]
 
 
 def relative(data: dict[str, Any], path: str | Path | None) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A scene as one would write it: without default values, and with ranges in place of long lists."""
+"""A scene as one would write it: without default values, and with ranges instead of long lists."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def short_form(scene: Scene) -> dict[str, Any]:
     data, whole = scene.to_dict(), _even(scene)
     for path, values in data.get("sweep", {}).items():
         data["sweep"][path] = _range(values)
-    for place in list(_places(data)):
+    for keys in list(_places(data)):
         without = copy.deepcopy(data)
         try:
-            del table_at(without, place)[place[-1]]
+            del table_at(without, keys)[keys[-1]]
         except (KeyError, IndexError):  # its table is gone already
             continue
         if _reads_as(without, whole):
@@ -32,15 +32,15 @@ def short_form(scene: Scene) -> dict[str, Any]:
     return data
 
 
-def _places(node: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+def _places(node: Any, keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
     """Yield the keys of nested tables, a table before the keys in it."""
     if isinstance(node, dict):
         for key, value in node.items():
-            yield (*place, key)
-            yield from _places(value, (*place, key))
+            yield (*keys, key)
+            yield from _places(value, (*keys, key))
     elif isinstance(node, list):
         for index, value in enumerate(node):
-            yield from _places(value, (*place, index))
+            yield from _places(value, (*keys, index))
 
 
 def _reads_as(data: dict[str, Any], whole: dict[str, Any]) -> bool:

@@ -8,15 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetJsonSchemaHandler,
-    PlainSerializer,
-    ValidationError,
-    WrapValidator,
-)
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, PlainSerializer, ValidationError, WrapValidator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
@@ -119,7 +111,7 @@ def options_of(table: Mapping[str, Any]) -> SolverOptions:
 
 def _stranger(key: str, method: str) -> str:
     """Return why a method has no such option: other methods have it, or none has."""
-    known = {name: part.Options.model_fields for name, part in METHODS.all().items()}
+    known = {name: solver.Options.model_fields for name, solver in METHODS.all().items()}
     users = [name for name, options in known.items() if key in options]
     if users:
         return f"is for method {' or '.join(users)}, not {method}"
@@ -144,7 +136,7 @@ class _EveryMethod:
 
     @staticmethod
     def __get_pydantic_json_schema__(schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        tables = {name: handler(part.Options.__pydantic_core_schema__) for name, part in METHODS.all().items()}
+        tables = {name: handler(method.Options.__pydantic_core_schema__) for name, method in METHODS.all().items()}
         for name, made in tables.items():
             table = handler.resolve_ref_schema(made)
             table["title"] = name

@@ -56,5 +56,5 @@ def _inside(whole: dict[str, Any], table: dict[str, Any], step: str) -> list[dic
     """Return the schemas at a step of a path: a key, an entry of a list, or a key of all its entries."""
     if "items" not in table:
         return [node for node in (key_in(table, step),) if node]
-    found = [key_in(entry, step) for entry in options(whole, table["items"])]
-    return [node for node in found if node] or [table["items"]]
+    nodes = [key_in(entry, step) for entry in options(whole, table["items"])]
+    return [node for node in nodes if node] or [table["items"]]

@@ -1,4 +1,4 @@
-"""The quantities of a motion with their derivatives: the table's formulas on what was measured (measures)."""
+"""The quantities of a motion with their derivatives: the table's formulas on `measures`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vanedamp.coupling.tangents.dual import Dual, zeros
 
 
 class Figures:
-    """What quantities need of the periods that count, of some in all, and the quantities.
+    """Inputs of quantities in the periods that count, of some in all, and the quantities.
 
     kinks: whether largest values have derivatives on one side only.
     """
@@ -35,24 +35,24 @@ class Figures:
         return Dual(self._system.period, self._of.period)
 
     def all(self) -> dict[str, Dual]:
-        """Return those that are known, by name, of those with a dimension each number, by its label or place."""
-        sources, found = self._sources(), dict[str, Dual]()
+        """Return those that are known, by name, of those with a dimension each number, by its label or index."""
+        sources, figures = self._sources(), dict[str, Dual]()
         for name, value in evaluated(sources).items():
-            found |= dict(_named(name, value + self._zero if isinstance(value, float) else value))
+            figures |= dict(_named(name, value + self._zero if isinstance(value, float) else value))
         for order, wave in zip(self._measures.orders, self._measures.waves[1:], strict=True):
-            part = {"harmonic": wave} | {name: sources[name] for name in ("counted", "period")}
+            needed = {"harmonic": wave} | {name: sources[name] for name in ("counted", "period")}
             for one in table().values() if order != 1 else ():
-                if set(one.needs) == set(part):
-                    found[f"harmonic.{order}.{one.name.removesuffix('_harmonic')}"] = one.of(part)
-        return found | {f"energy.{name}": one for name, one in sources["energy"].items()}
+                if set(one.needs) == set(needed):
+                    figures[f"harmonic.{order}.{one.name.removesuffix('_harmonic')}"] = one.of(needed)
+        return figures | {f"energy.{name}": one for name, one in sources["energy"].items()}
 
     def _sources(self) -> dict[str, Any]:
-        """Return what quantities need, as far as it has derivatives (quantities.sums)."""
+        """Return inputs of quantities that have derivatives (quantities.sums)."""
         measures, first, row = self._measures, self._measures.first, np.empty(len(SUMS))
         measure(measured_of(self._scene, self._system), measures.run.records, first, self._periods, np.nan, row)
         known, static = sources_of(row), self._mean(measures.response)
         heights, distances = (self._distances(measures.response, mean, first) for mean in (self._zero, static))
-        found: dict[str, Any] = {
+        sources: dict[str, Any] = {
             "counted": self._count, "period": self._period, "omega": measures.omega, "static": static,
             "highest": self._top(heights), "heights": heights.sum(),
             "distance": self._top(distances), "distances": distances.sum(), "square": measures.sums[0],
@@ -61,21 +61,24 @@ class Figures:
             "carried": Dual(known["carried"], self._of.mass[:, self._system.along].sum(axis=1)),
         }  # fmt: skip
         if 1 in measures.orders:
-            found["harmonic"] = measures.waves[1 + measures.orders.index(1)]
+            sources["harmonic"] = measures.waves[1 + measures.orders.index(1)]
         if measures.wear is not None:
-            found["wear"] = measures.wear.rates(self._span)
-            depths = [one.depth_rate for one in found["wear"] or () if one.depth_rate is not None]
+            sources["wear"] = measures.wear.rates(self._span)
+            depths = [one.depth_rate for one in sources["wear"] or () if one.depth_rate is not None]
             self._top(joined(depths, self._number))
         if measures.contacts is not None:
-            found["contacts"], kinks = measures.contacts.worst()
+            sources["contacts"], kinks = measures.contacts.worst()
             self.kinks |= kinks
         if measures.outputs:
-            found["sectors"] = self._sectors()
+            sources["sectors"] = self._sectors()
         plane = measures.run.outcome().plane
         if plane is not None:
-            found["tilt"], found["lifted"] = self._tilts(), measures.lifted + np.where(self._system.tilt < 0, np.nan, 0)
-            found["walls"] = plane.walls[first : self._periods].sum(axis=0) + 0.0 * measures.lifted
-        return found
+            sources["tilt"], sources["lifted"] = (
+                self._tilts(),
+                measures.lifted + np.where(self._system.tilt < 0, np.nan, 0),
+            )
+            sources["walls"] = plane.walls[first : self._periods].sum(axis=0) + 0.0 * measures.lifted
+        return sources
 
     def _mean(self, swing: Swing) -> Dual:
         """Return the mean from which distances count: zero unless bodies bring a static load.
@@ -87,27 +90,27 @@ class Figures:
         return Dual(0.0, np.where(self._measures.begins, np.nan, 0.0))
 
     def _distances(self, swing: Swing, mean: Dual, first: int = 0) -> Dual:
-        found, kinks = swing.distances(mean, first)
+        heights, kinks = swing.distances(mean, first)
         self.kinks |= kinks
-        return found
+        return heights
 
     def _top(self, each: Dual) -> Dual:
-        found, kinks = top_of(each)
+        top, kinks = top_of(each)
         self.kinks |= kinks
-        return found
+        return top
 
     def _sectors(self) -> SimpleNamespace:
         """Return the response of the sectors of a ring, as response.by_sector does."""
         measures, owner = self._measures, np.array(sectors_of_bodies(self._scene, self._system), int)
-        found = [self._distances(one, self._mean(one)) for one in measures.outputs]
+        sectors = [self._distances(one, self._mean(one)) for one in measures.outputs]
         units = np.flatnonzero(~self._system.without_body)
         units = units[owner[self._system.body[units]] >= 0]
-        hits = np.bincount(owner[self._system.body[units]], measures.hits[units], len(found)) / self._count
-        mean = joined([heights.mean() for heights in found], self._number)
+        hits = np.bincount(owner[self._system.body[units]], measures.hits[units], len(sectors)) / self._count
+        mean = joined([heights.mean() for heights in sectors], self._number)
         self._top(mean)
         return SimpleNamespace(
-            amplitude_mean=mean, amplitude_max=joined([self._top(heights) for heights in found], self._number),
-            amplitude_undamped=None, amplitude_fixed=None, impacts_per_period=hits + zeros(len(found), self._number),
+            amplitude_mean=mean, amplitude_max=joined([self._top(heights) for heights in sectors], self._number),
+            amplitude_undamped=None, amplitude_fixed=None, impacts_per_period=hits + zeros(len(sectors), self._number),
             tuned=self._tuned(),
         )  # fmt: skip
 
@@ -116,8 +119,8 @@ class Figures:
         here = tuned_amplitude(self._scene)
         if here is None:
             return None
-        told = self._measures.numbers.of_scene(lambda scene: np.array([tuned_amplitude(scene)]), np.array([here]))
-        return Dual(here, told[0])
+        tuned = self._measures.numbers.of_scene(lambda scene: np.array([tuned_amplitude(scene)]), np.array([here]))
+        return Dual(here, tuned[0])
 
     def _tilts(self) -> Dual:
         """Return the largest tilts (b,) of bodies, rad; nan of sliders."""

@@ -1,4 +1,4 @@
-"""What quantities need of a motion, with derivatives by numbers, taken segment by segment as the motion passes."""
+"""Inputs of quantities of a motion, with derivatives by numbers, taken segment by segment as the motion passes."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import null_space
 
-from vanedamp.coupling.derivatives.dynamics import Dynamics, Flow
+from vanedamp.coupling.derivatives.dynamics import Flow, ScaledDynamics
 from vanedamp.coupling.derivatives.flow_derivative import derivative_of
-from vanedamp.coupling.derivatives.numbers import Numbers
-from vanedamp.coupling.derivatives.series import Course
+from vanedamp.coupling.derivatives.numbers import Parameters
+from vanedamp.coupling.derivatives.series import Trajectory
 from vanedamp.coupling.derivatives.walk import Before
 from vanedamp.coupling.engine.trace import Leg
 from vanedamp.coupling.numerics import codes
@@ -39,9 +39,9 @@ _KEPT, _SAME = 1000, 1e-12
 
 
 class Measures:
-    """Takes what passes (derivatives.walk.Watch) from a period `first` on, and all peaks, impacts and samples.
+    """Observes a passage (derivatives.walk.WalkObserver) from a period `first` on, and all peaks, impacts and samples.
 
-    orders: of the harmonics; times: of samples, s since the start, rising; sampled: what they are of, in place of the
+    orders: of the harmonics; times: of samples, s since the start, rising; sampled: functionals, instead of the
     response; run: the engine's, once it has begun. Derivatives are by the sizes of the numbers.
     """
 
@@ -49,7 +49,7 @@ class Measures:
     nears = False
 
     def __init__(
-        self, dynamics: Dynamics, numbers: Numbers, first: int, orders: Sequence[int] = (1,),
+        self, dynamics: ScaledDynamics, numbers: Parameters, first: int, orders: Sequence[int] = (1,),
         times: Sequence[float] = (), sampled: Functionals | None = None,
     ) -> None:  # fmt: skip
         self.dynamics, self.numbers, self.first, self.orders = dynamics, numbers, first, tuple(orders)
@@ -65,7 +65,7 @@ class Measures:
             [Functionals(rows[[k]], own[:, [k]]) for k in range(len(rows))]
             for rows, own in ((dynamics.outputs, of.outputs), (dynamics.tilts, of.tilts))
         )
-        #: what is seen of the whole motion: momentum, and what swings
+        #: followed over the whole motion: momentum, and swings
         self._sampled = sampled or response
         self._seen = joined([momentum_of(dynamics, numbers), response, *outputs, *tilts])
         self.response = Swing(response, self._deflected)
@@ -87,7 +87,7 @@ class Measures:
         self._since: np.ndarray = np.zeros(self._P)
         self._begun: Before | None = None
 
-    # --- what a walk calls
+    # --- called by a walk
 
     def begin(self, unheld: np.ndarray) -> None:
         """Take the start as it is given: friction may take its momentum at once."""
@@ -98,7 +98,7 @@ class Measures:
         self._begun = begun._replace(segment=begun.segment._replace(duration=duration))
 
     def event(self, before: Before, new: Leg, M: np.ndarray, shift: np.ndarray) -> None:
-        """Take an event, or a period's end, and what led there."""
+        """Take an event, or a period's end, and the flow before."""
         boundary = before.event.unit < 0
         moves = new.period * self.numbers.parts.period if boundary else shift[self._k :]
         self._passed(before, moves)
@@ -137,7 +137,7 @@ class Measures:
         self.lifted.turns[up] += shift - self._since
 
     def _take(
-        self, begun: Before, Z: np.ndarray, course: Course, end: tuple[np.ndarray, np.ndarray],
+        self, begun: Before, Z: np.ndarray, course: Trajectory, end: tuple[np.ndarray, np.ndarray],
         moves: tuple[np.ndarray, np.ndarray],
     ) -> None:  # fmt: skip
         """Take a piece of a segment. end: z (K,), Z (K, P) there; moves: (P,) of its start and end in time."""
@@ -211,7 +211,7 @@ class Measures:
         return Dual(system.omega, -of.period * system.omega / system.period)
 
     def _struck(self, before: Before, new: Leg, M: np.ndarray, shift: np.ndarray) -> None:
-        """Take what impacts do: their speeds, and the energy that they take."""
+        """Take impacts: their speeds, and their energy."""
         dynamics, event, of, k = self.dynamics, before.event, self.numbers.parts, self._k
         w, w_after = before.u[dynamics.rates], dynamics.state(new)[dynamics.rates]
         massive = np.ones(len(w), bool)
@@ -241,40 +241,40 @@ class Measures:
         if not counts:
             return
         np.add.at(self.hits, event.struck, 1.0)
-        rigid = [place for place, r in enumerate(units) if np.isinf(dynamics.system.spring[r])]
-        for place in rigid if self.wear is not None else ():
-            r = units[place]
+        rigid = [index for index, r in enumerate(units) if np.isinf(dynamics.system.spring[r])]
+        for index in rigid if self.wear is not None else ():
+            r = units[index]
             mobility = Dual(dynamics.rows[r] @ dynamics.rows[r], 2.0 * of.rows[:, r] @ dynamics.rows[r])
-            if met[place].value > 0.0:
-                self.wear.strike(r, 0.5 * met[place] * met[place] / mobility)  # type: ignore[union-attr]
+            if met[index].value > 0.0:
+                self.wear.strike(r, 0.5 * met[index] * met[index] / mobility)  # type: ignore[union-attr]
         if self.contacts is not None and rigid:
             impulse = self._impulses(event.impulse, (turns[1] - turns[0])[massive], massive)
-            for place in rigid:
-                r = units[place]
-                if met[place].value > 0.0 and impulse.value[r] != 0.0:
-                    after = speed(r, float(event.after[place]), w_after, turns[1])
-                    self.contacts.strike(met[place], after, abs(impulse[r]))
+            for index in rigid:
+                r = units[index]
+                if met[index].value > 0.0 and impulse.value[r] != 0.0:
+                    after = speed(r, float(event.after[index]), w_after, turns[1])
+                    self.contacts.strike(met[index], after, abs(impulse[r]))
 
     def _impulses(self, impulse: np.ndarray, turns: np.ndarray, massive: np.ndarray) -> Dual:
-        """Return impulses (2u,), N s, by how the speeds that they change turn; nan of those that these do not tell."""
+        """Return impulses (2u,), N s, by how the speeds that they change turn; nan where undetermined."""
         acts = np.flatnonzero(impulse)
-        rows, found = self.dynamics.rows[acts][:, massive], np.full((len(impulse), self._P), np.nan)
+        rows, slopes = self.dynamics.rows[acts][:, massive], np.full((len(impulse), self._P), np.nan)
         length = np.linalg.norm(rows, axis=1)
         left = turns - (impulse[acts] @ self.numbers.parts.rows[:, acts][:, :, massive]).T
-        told = np.linalg.norm(null_space((rows / length[:, None]).T, SINGULAR), axis=1) <= SINGULAR
-        found[acts[told]] = (np.linalg.pinv(rows.T / length, SINGULAR) @ left / length[:, None])[told]
-        return Dual(impulse, found)
+        unique = np.linalg.norm(null_space((rows / length[:, None]).T, SINGULAR), axis=1) <= SINGULAR
+        slopes[acts[unique]] = (np.linalg.pinv(rows.T / length, SINGULAR) @ left / length[:, None])[unique]
+        return Dual(impulse, slopes)
 
     def _let_go(self, before: Before, after: Flow, shift: np.ndarray) -> None:
         """Take the energy of springs whose force ends, or begins, while they are pressed: it is lost with contact."""
         dynamics, of = self.dynamics, self.numbers.parts
-        own, new = set(before.flow.solved.pressed.tolist()), set(after.solved.pressed.tolist())
-        if own == new:
+        pressed, new = set(before.flow.solved.pressed.tolist()), set(after.solved.pressed.tolist())
+        if pressed == new:
             return
         Z = self._whole(before.M, before.segment.start + before.segment.duration)
         row = 1 + POWERS.index("contact")
-        for r in sorted(own ^ new):
-            way, spring = (1.0 if r in own else -1.0), float(dynamics.system.spring[r])
+        for r in sorted(pressed ^ new):
+            way, spring = (1.0 if r in pressed else -1.0), float(dynamics.system.spring[r])
             gap, rate = float(dynamics.gap[r] @ before.z), float(dynamics.gap[r] @ before.flow.X @ before.z)
             turned = dynamics.gap[r] @ Z + of.gap[:, r] @ before.z + rate * shift
             self.sums.value[row] += way * 0.5 * spring * gap**2
@@ -288,13 +288,13 @@ class Measures:
             moved = derivative_of(begun.flow, self.numbers)
             course = moved.series.course(begun.z, Z, max(time - start, 0.0), False)
             z, turns, X, D = course.last, course.end, begun.flow.X, moved.X
-            values, found = [], []
+            values, slopes = [], []
             for _ in range(3):
-                value, own = self._sampled.of(z[None], turns[None])
+                value, slope = self._sampled.of(z[None], turns[None])
                 values.append(float(value[0, 0]))
-                found.append(own[0, 0])
+                slopes.append(slope[0, 0])
                 z, turns = X @ z, X @ turns + (D @ z).T
-            self.samples.append((time, np.array(values), np.array(found)))
+            self.samples.append((time, np.array(values), np.array(slopes)))
 
     # --- results
 

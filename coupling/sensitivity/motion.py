@@ -1,4 +1,4 @@
-"""A motion that is passed with its derivatives by numbers, and the record of what was found."""
+"""A motion that is passed with its derivatives by numbers, and the record."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import Dynamics
+from vanedamp.coupling.derivatives.dynamics import ScaledDynamics
 from vanedamp.coupling.derivatives.event_names import EventNames
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
-from vanedamp.coupling.derivatives.numbers import Numbers, StartOf, numbers_of
+from vanedamp.coupling.derivatives.numbers import Parameters, StartOf, numbers_of
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
 from vanedamp.coupling.response.segment import EventRun
@@ -28,7 +28,7 @@ Paths = tuple[str | MatrixDirection, ...]
 #: growth of neighbouring motions beyond which derivatives of a run say nothing
 _PARTED = 1e6
 
-#: what is to be known of derivatives that there are: of a kink of amplitudes, of a chatter that the engine completes
+#: notes on derivatives: of a kink of amplitudes, of a chatter that the engine completes
 _NOTES = (
     "summits of one height part: derivatives of amplitudes and other largest values hold on one side",
     "a chatter ends in the motion: derivatives hold to some 1e-6, of what its last flights alone move to less",
@@ -51,7 +51,7 @@ class NoDerivative(ArithmeticError):
         self.status, self.note = status, note
 
 
-class Motion:
+class TangentRun:
     """A motion of a scene from a state (k,), to be passed with its derivatives.
 
     derived: the scene that runs, from the one with the numbers; begins: the state of the start from both
@@ -61,16 +61,16 @@ class Motion:
 
     def __init__(
         self, scene: Scene, paths: Paths, derived: Callable[[Scene], Scene] = lambda scene: scene,
-        begins: StartOf | None = None, speed: float | None = None, dynamics: Dynamics | None = None,
+        begins: StartOf | None = None, speed: float | None = None, dynamics: ScaledDynamics | None = None,
         earlier: Sequence[EventRun] = (),
     ) -> None:  # fmt: skip
         self._earlier = earlier
         self.frame = Frame(derived(scene), speed) if dynamics is None else dynamics.frame
         self.scene, self.completed = self.frame.scene, False
         if dynamics is None:
-            dynamics = Dynamics(self.frame, self._sizes(None if begins is None else begins(scene, self.frame)))
+            dynamics = ScaledDynamics(self.frame, self._sizes(None if begins is None else begins(scene, self.frame)))
         self.dynamics = dynamics
-        self.numbers: Numbers = numbers_of(scene, paths, self.dynamics, begins, derived)
+        self.numbers: Parameters = numbers_of(scene, paths, self.dynamics, begins, derived)
 
     def _sizes(self, start: np.ndarray | None) -> np.ndarray:
         """Return sizes (k,) of the coordinates: modes move at least as far as from the start, if that is given."""
@@ -110,9 +110,9 @@ class Motion:
 
 def check(status: PassageStatus, when: str = "") -> None:
     """Raise NoDerivative for a passage that has none."""
-    found, note = MEANING[status]
-    if found is not SensitivityStatus.OK:
-        raise NoDerivative(found, f"{when}{note}")
+    outcome, note = MEANING[status]
+    if outcome is not SensitivityStatus.OK:
+        raise NoDerivative(outcome, f"{when}{note}")
 
 
 def check_together(growth: np.ndarray) -> None:
@@ -122,12 +122,12 @@ def check_together(growth: np.ndarray) -> None:
         raise NoDerivative(SensitivityStatus.PARTS, f"neighbouring motions end {most:.1e} times as far apart")
 
 
-def record(motion: Motion, measures: Measures, periods: int, state: np.ndarray, turns: np.ndarray) -> Sensitivity:
+def record(motion: TangentRun, measures: Measures, periods: int, state: np.ndarray, turns: np.ndarray) -> Sensitivity:
     """Return the record of a motion with derivatives. turns: (k, P) of the state."""
     size, number = motion.numbers.size, len(motion.numbers)
-    told, heights = Figures(measures, periods), measures.heights
-    figures = told.all()
-    notes = [note for note, said in zip(_NOTES, (told.kinks, motion.completed), strict=True) if said]
+    source, heights = Figures(measures, periods), measures.heights
+    figures = source.all()
+    notes = [note for note, said in zip(_NOTES, (source.kinks, motion.completed), strict=True) if said]
     begins = [path for path, said in zip(motion.numbers.paths, measures.begins.tolist(), strict=True) if said]
     notes += [f"{path}: bodies begin to deflect the structure, from where distances count" for path in begins]
     rows = lambda found, *shape: frozen(np.reshape(found, (-1, *shape, number)) / size)  # noqa: E731

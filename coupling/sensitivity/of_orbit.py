@@ -14,10 +14,10 @@ from scipy.linalg import matrix_balance, svd
 from vanedamp.coupling.derivatives.event_functions import TANGENTIAL
 from vanedamp.coupling.derivatives.passage import Passage, PassageStatus
 from vanedamp.coupling.orbits.multipliers import NULL
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
+from vanedamp.coupling.orbits.newton import OrbitStatus, PeriodicOrbit
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.sensitivity.measures import Measures
-from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, record
+from vanedamp.coupling.sensitivity.motion import NoDerivative, Paths, TangentRun, check, record
 from vanedamp.coupling.sensitivity.passed import Passed
 from vanedamp.coupling.sensitivity.sensitivity_record import SERIES, Sensitivity, SensitivityStatus
 from vanedamp.coupling.tangents.opaque import opaque
@@ -38,7 +38,7 @@ _OPEN, _NOTHING = 1e-6, 1e-9
 _DEPENDS = 1e-6
 
 
-def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
+def of_orbit(orbit: PeriodicOrbit, paths: Paths, **options: Any) -> Sensitivity:
     """Return the derivatives of an orbit. Raises NoDerivative, InputError and NotSmooth."""
     if orbit.status is not OrbitStatus.OK or orbit.map is None:
         raise NoDerivative(SensitivityStatus.STOPPED, f"no orbit was found: {orbit.status.value}")
@@ -46,24 +46,24 @@ def of_orbit(orbit: Orbit, paths: Paths, **options: Any) -> Sensitivity:
     motion = _motion(orbit.section.map, paths)
     passed = Passed()
     turns, known, neutral = _moved(orbit, motion, passed)
-    found = _followed(orbit, motion, turns, paths, options, passed, known)
+    result = _followed(orbit, motion, turns, paths, options, passed, known)
     count, others = len(motion.numbers), list[Sensitivity]()
     for first in range(0, len(neutral), count):
         aside = neutral[first : first + count]
         shift = np.zeros_like(turns)
         shift[:, : len(aside)] = aside.T / motion.numbers.size[: len(aside)]
         others.append(_followed(orbit, motion, turns + shift, paths, options, passed, known, True))
-    return _without_open(found, others, motion.numbers.size) if others else found
+    return _without_open(result, others, motion.numbers.size) if others else result
 
 
 def _followed(
-    orbit: Orbit, motion: Motion, turns: np.ndarray, paths: Paths, options: dict[str, Any], passed: Passed,
+    orbit: PeriodicOrbit, motion: TangentRun, turns: np.ndarray, paths: Paths, options: dict[str, Any], passed: Passed,
     known: PassageStatus, aside: bool = False,
 ) -> Sensitivity:  # fmt: skip
     """Return the derivatives along an orbit whose section numbers turn by (k, P).
 
     passed: the passage from the section; known: how that ended, to be judged but for `aside`, of another orbit that
-    numbers leave open.
+    numbers do not determine.
     """
     section, periods, state = orbit.section, orbit.periods, orbit.section.state
     if known is PassageStatus.OK and not section.later:
@@ -79,9 +79,9 @@ def _followed(
         state, turns = orbit.state, rest.by_number
         motion = _motion(orbit.map, paths)
     measures = Measures(motion.dynamics, motion.numbers, 0, **options)
-    # of the motions beside this one only those by the numbers count
+    # only neighbouring motions by the numbers count
     passage = motion.passed(state, turns, periods, measures, True)
-    # an event or a contact at rest at the very start or end is no kink of the motion, as its section tells
+    # an event or a contact at rest at the very start or end is no kink of the motion
     check(PassageStatus.OK if section.later and passage.status in _ONE_SIDED else passage.status)
     if not aside:
         if known is not PassageStatus.OK and not _same(passage.by_number, turns, orbit.scale):
@@ -90,53 +90,53 @@ def _followed(
     return record(motion, measures, periods, state, turns)
 
 
-def _without_open(found: Sensitivity, others: Sequence[Sensitivity], size: np.ndarray) -> Sensitivity:
-    """Return the record without derivatives, by any number, of what differs along orbits that numbers leave open."""
+def _without_open(result: Sensitivity, others: Sequence[Sensitivity], size: np.ndarray) -> Sensitivity:
+    """Return the record without derivatives of quantities that differ along orbits that numbers do not determine."""
 
     def is_open(turns: np.ndarray, of_others: Iterable[np.ndarray], most: float) -> np.ndarray:
         """Return of which results (..., 1)."""
         differ = [np.abs(each - turns) * size > _DEPENDS * most for each in of_others if each.shape == turns.shape]
         return np.any(differ, axis=0).any(axis=-1, keepdims=True) if differ else np.zeros((*turns.shape[:-1], 1), bool)
 
-    largest = {name: abs(value) for name, value in found.values.items()}
+    largest = {name: abs(value) for name, value in result.values.items()}
     energy = max(value for name, value in largest.items() if name.startswith("energy."))
     names = [
-        name for name, turns in found.derivatives.items()
+        name for name, turns in result.derivatives.items()
         if is_open(turns, (each.derivatives[name] for each in others),
                    energy if name.startswith("energy.") else largest[name]).any()
     ]  # fmt: skip
     series = dict[str, Any]()
     for name in SERIES[1:]:
-        key, most = f"{name}_derivative", float(np.abs(getattr(found, name)).max(initial=0.0))
-        turns = getattr(found, key)
+        key, most = f"{name}_derivative", float(np.abs(getattr(result, name)).max(initial=0.0))
+        turns = getattr(result, key)
         off = is_open(turns, (getattr(each, key) for each in others), most)
         series[key] = frozen(np.where(off, np.nan, turns))
     note = f"no derivatives of {', '.join(names)}: they depend on where a body rests, which numbers leave open"
-    nothing = frozen(np.full(len(found.paths), np.nan))
+    nothing = frozen(np.full(len(result.paths), np.nan))
     return replace(
-        found, derivatives=dict(found.derivatives) | dict.fromkeys(names, nothing), **series,
-        note="; ".join(filter(None, (found.note, note if names else ""))),
+        result, derivatives=dict(result.derivatives) | dict.fromkeys(names, nothing), **series,
+        note="; ".join(filter(None, (result.note, note if names else ""))),
     )  # fmt: skip
 
 
-def _motion(period_map: PeriodMap, paths: Paths) -> Motion:
+def _motion(period_map: PeriodMap, paths: Paths) -> TangentRun:
     """Return the motion of a period map's scene from its section."""
     made = partial(opaque, period_map.made)
-    return Motion(period_map.given, paths, made, dynamics=period_map.dynamics, earlier=period_map.earlier)
+    return TangentRun(period_map.given, paths, made, dynamics=period_map.dynamics, earlier=period_map.earlier)
 
 
 def _same(turns: np.ndarray, other: np.ndarray, scale: np.ndarray) -> bool:
-    """Return whether derivatives (k, P) of a state are the same, within what is certain of an orbit's."""
+    """Return whether derivatives (k, P) of a state are the same, within an orbit's uncertainty."""
     off, size = (np.abs(each / scale[:, None]).max(axis=0, initial=0.0) for each in (turns - other, other))
     return bool(np.all(off <= _UNCERTAIN * size))
 
 
-def _moved(orbit: Orbit, motion: Motion, passed: Passed) -> tuple[np.ndarray, PassageStatus, np.ndarray]:
+def _moved(orbit: PeriodicOrbit, motion: TangentRun, passed: Passed) -> tuple[np.ndarray, PassageStatus, np.ndarray]:
     """Return how numbers move the state (k, P) of an orbit's section, how its passage ended, and open moves (n, k).
 
     passed: takes that passage.
 
-    One with kinks beside it, whose derivative holds on one side, may have none along the numbers. Raises NoDerivative
+    One with kinks nearby, whose derivative is one-sided, may have none along the numbers. Raises NoDerivative
     where the state does not depend smoothly on them.
     """
     state, still = orbit.section.state, np.zeros((len(orbit.state), len(motion.numbers)))
@@ -161,7 +161,7 @@ def _moved(orbit: Orbit, motion: Motion, passed: Passed) -> tuple[np.ndarray, Pa
 class _Equations:
     """The equations (1 - D) x = dP/dp of how an orbit moves, in coordinates of sizes that balance D."""
 
-    def __init__(self, passage: Passage, motion: Motion, orbit: Orbit) -> None:
+    def __init__(self, passage: Passage, motion: TangentRun, orbit: PeriodicOrbit) -> None:
         numbers, D = motion.numbers, passage.scaled(orbit.scale)
         _, (balance, _) = matrix_balance(D, permute=False, separate=True)
         self.scale, self._size = orbit.scale * balance, numbers.size
@@ -184,7 +184,7 @@ class _Equations:
         return np.asarray(self.rows[~self.kept] * self.scale)
 
     def farthest(self) -> np.ndarray:
-        """Return the move (k,) of the state that round-off of the map leaves open most."""
+        """Return the move (k,) of the state least determined beyond the map's round-off."""
         if not self.kept.any():
             return np.zeros(len(self.scale))
         last = np.flatnonzero(self.kept)[-1]
@@ -195,8 +195,8 @@ class _Equations:
         parts, kept = self.left.T @ self.right, self.kept
         if np.any(np.abs(parts[~kept]) > _DRIVEN * (np.abs(self.right).max(initial=0.0) + NULL)):
             raise NoDerivative(SensitivityStatus.UNDETERMINED, "numbers set a body adrift that rests anywhere")
-        found = self.rows.T[:, kept] @ (parts[kept] / self.sizes[kept, None])
-        return np.asarray(found * self.scale[:, None] / self._size)
+        solution = self.rows.T[:, kept] @ (parts[kept] / self.sizes[kept, None])
+        return np.asarray(solution * self.scale[:, None] / self._size)
 
 
 def _check_energies(measures: Measures) -> None:

@@ -17,7 +17,7 @@ from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.integrands import Functionals
 from vanedamp.coupling.sensitivity.measures import Measures
-from vanedamp.coupling.sensitivity.motion import Motion, NoDerivative, Paths, check, check_together, record
+from vanedamp.coupling.sensitivity.motion import NoDerivative, Paths, TangentRun, check, check_together, record
 from vanedamp.coupling.sensitivity.of_orbit import of_orbit
 from vanedamp.coupling.sensitivity.sensitivity_record import Sensitivity, SensitivityStatus
 from vanedamp.coupling.tangents.opaque import opaque
@@ -38,16 +38,16 @@ def of_run(scene: Scene, paths: Paths, start: RestartState | None, **options: An
     def begins(other: Scene, frame: Frame) -> np.ndarray:
         return _own_start(other, frame) if start is None else frame.state_of(at_speed_of(frame.scene, start))
 
-    motion = Motion(scene, paths, run_of, begins)
+    motion = TangentRun(scene, paths, run_of, begins)
     periods, numbers = scene.time.simulated, motion.numbers
     measures = Measures(motion.dynamics, numbers, scene.time.dropped, **options)
     turns = numbers.parts.start.T / numbers.size
     return _measured(motion, begins(scene, motion.frame), turns, periods, measures)
 
 
-def of_ring_down(found: RingDown, paths: Paths, orders: Sequence[int], times: Sequence[float]) -> Sensitivity:
+def of_ring_down(decay: RingDown, paths: Paths, orders: Sequence[int], times: Sequence[float]) -> Sensitivity:
     """Return the derivatives along the free motion of a ring-down. Raises NoDerivative, InputError and NotSmooth."""
-    scene, run_of = _alone(found.scene)
+    scene, run_of = _alone(decay.scene)
     table, state, turns = table_of(scene), None, None
     if table.start == "steady":
         state, turns = _steady(run_of(scene), paths)
@@ -57,12 +57,12 @@ def of_ring_down(found: RingDown, paths: Paths, orders: Sequence[int], times: Se
             return state
         return frame.state_of(blown_or_pulled(run_of(other), table))
 
-    motion = Motion(scene, paths, lambda other: free_scene(run_of(other), table=table), begins)
-    numbers, response, mode = motion.numbers, motion.dynamics.response, found.linear.mode
-    row, own = np.zeros((1, len(response))), np.zeros((len(numbers), 1, len(response)))
-    row[0, mode], own[:, 0, mode] = response[mode], numbers.parts.response[:, mode]
+    motion = TangentRun(scene, paths, lambda other: free_scene(run_of(other), table=table), begins)
+    numbers, response, mode = motion.numbers, motion.dynamics.response, decay.linear.mode
+    row, slopes = np.zeros((1, len(response))), np.zeros((len(numbers), 1, len(response)))
+    row[0, mode], slopes[:, 0, mode] = response[mode], numbers.parts.response[:, mode]
     measures = Measures(
-        motion.dynamics, numbers, 0, orders, times or found.time.tolist(), sampled=Functionals(row, own)
+        motion.dynamics, numbers, 0, orders, times or decay.time.tolist(), sampled=Functionals(row, slopes)
     )  # fmt: skip
     turns = numbers.parts.start.T / numbers.size if turns is None else turns
     return _measured(motion, begins(scene, motion.frame), turns, motion.scene.time.simulated, measures)
@@ -80,7 +80,7 @@ def of_ramp(ramp: Ramp, paths: Paths) -> Sensitivity:
         def at(other: Scene, value: float = value) -> Scene:
             return opaque(lambda one: scene_at(ramped(run_of(one)), table, value), other)
 
-        motion = Motion(scene, paths, at, _own_start, speed=float(course.speed[0]))
+        motion = TangentRun(scene, paths, at, _own_start, speed=float(course.speed[0]))
         if period == 0:
             state, turns = _own_start(scene, motion.frame), motion.numbers.parts.start.T / motion.numbers.size
             if table.start == "steady":
@@ -101,7 +101,9 @@ def of_ramp(ramp: Ramp, paths: Paths) -> Sensitivity:
     )  # fmt: skip
 
 
-def _measured(motion: Motion, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures) -> Sensitivity:
+def _measured(
+    motion: TangentRun, state: np.ndarray, turns: np.ndarray, periods: int, measures: Measures
+) -> Sensitivity:
     passage = motion.passed(state, turns, periods, measures, True)
     check(passage.status)
     check_together(motion.grown(passage))
@@ -109,7 +111,7 @@ def _measured(motion: Motion, state: np.ndarray, turns: np.ndarray, periods: int
 
 
 def _alone(scene: Scene) -> tuple[Scene, Callable[[Scene], Scene]]:
-    """Return a scene without tables of what other commands do over its numbers, and how what runs follows from it.
+    """Return a scene without tables of other commands, and how the run follows from it.
 
     Numbers are those of the scene as it is given: one of a ring may be many of its sectors'.
     """
@@ -127,5 +129,5 @@ def _steady(scene: Scene, paths: Paths) -> tuple[np.ndarray, np.ndarray]:
     orbit = settled_orbit(scene)
     if orbit is None:
         raise NoDerivative(SensitivityStatus.PARTS, "the steady motion that it begins with does not repeat")
-    found = of_orbit(orbit, paths)
-    return orbit.state, found.state_derivative
+    result = of_orbit(orbit, paths)
+    return orbit.state, result.state_derivative

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.walk import Before, Watch
+from vanedamp.coupling.derivatives.walk import Before, WalkObserver
 from vanedamp.coupling.engine.trace import Leg
 from vanedamp.coupling.response.segment import EventRun
 
@@ -15,22 +15,22 @@ _Moved = Callable[[np.ndarray], np.ndarray]
 
 
 class Passed:
-    """Keeps what passes (derivatives.walk.Watch). run: the engine's, once it has begun."""
+    """Keeps a passage (derivatives.walk.WalkObserver). run: the engine's, once it has begun."""
 
     run: EventRun
     nears = True
 
     def __init__(self) -> None:
-        self._told = list[Callable[[Watch, _Moved], None]]()
+        self._told = list[Callable[[WalkObserver, _Moved], None]]()
 
-    def along(self, turned: np.ndarray, watch: Watch) -> None:
+    def along(self, turned: np.ndarray, watch: WalkObserver) -> None:
         """Let another one take the motion whose start numbers turn by (k, P), in units of its sizes."""
         k = len(turned)
 
         def moved(M: np.ndarray) -> np.ndarray:
-            found = M.copy()
-            found[..., k:] += M[..., :k] @ turned
-            return found
+            image = M.copy()
+            image[..., k:] += M[..., :k] @ turned
+            return image
 
         for tell in self._told:
             tell(watch, moved)
@@ -44,7 +44,7 @@ class Passed:
         self._told.append(lambda watch, moved: watch.segment(begun._replace(M=moved(begun.M)), duration))
 
     def event(self, before: Before, new: Leg, M: np.ndarray, shift: np.ndarray) -> None:
-        """Take an event, or a period's end, and what led there."""
+        """Take an event, or a period's end, and the flow before."""
         self._told.append(lambda watch, moved: watch.event(
             before._replace(M=moved(before.M)), new, moved(M), moved(shift)
         ))  # fmt: skip

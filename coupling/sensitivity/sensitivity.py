@@ -1,7 +1,7 @@
 """Derivatives of orbits, runs, ring-downs and ramps by numbers of their scenes.
 
 Along a motion they follow exactly, event by event (derivatives.derivative). Of a motion that does not repeat only the
-path from a given start has derivatives, as long as neighbouring paths stay together.
+path from a given start has derivatives, while neighbouring paths stay together.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from vanedamp.coupling.derivatives.matrix_direction import MatrixDirection
-from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.orbits.newton import PeriodicOrbit
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene, loaded
 from vanedamp.coupling.sensitivity.motion import NoDerivative, Paths, nothing, together
@@ -29,7 +29,7 @@ _BY_NUMBER = (SensitivityStatus.UNDETERMINED, SensitivityStatus.GRAZING)
 
 
 def sensitivity(
-    motion: Orbit | RingDown | Ramp | Scene | str | Path, paths: Sequence[str | MatrixDirection],
+    motion: PeriodicOrbit | RingDown | Ramp | Scene | str | Path, paths: Sequence[str | MatrixDirection],
     orders: Sequence[int] = (1,), times: Sequence[float] = (), start: RestartState | None = None,
 ) -> Sensitivity:  # fmt: skip
     """Return the derivatives of a motion and its figures by numbers of its scene.
@@ -44,22 +44,22 @@ def sensitivity(
     if isinstance(paths, str):
         raise InputError(f'paths: expected a list of dotted paths, not "{paths}"')
     wanted, moments = tuple(paths), sorted(times)
-    found = _tried(motion, wanted, orders, moments, start)
-    if found.status in _BY_NUMBER and len(wanted) > 1:
+    result = _tried(motion, wanted, orders, moments, start)
+    if result.status in _BY_NUMBER and len(wanted) > 1:
         alone = [_tried(motion, (path,), orders, moments, start) for path in wanted]
         if any(each.status is SensitivityStatus.OK for each in alone):
             return together(alone)
-    return found
+    return result
 
 
-@np.errstate(all="ignore")  # nan is what is not known
+@np.errstate(all="ignore")  # nan: unknown
 def _tried(
-    motion: Orbit | RingDown | Ramp | Scene | str | Path, paths: Paths, orders: Sequence[int], times: list[float],
-    start: RestartState | None,
+    motion: PeriodicOrbit | RingDown | Ramp | Scene | str | Path, paths: Paths, orders: Sequence[int],
+    times: list[float], start: RestartState | None,
 ) -> Sensitivity:  # fmt: skip
     """Return the derivatives, or the record of why there are none."""
     try:
-        if isinstance(motion, Orbit):
+        if isinstance(motion, PeriodicOrbit):
             return of_orbit(motion, paths, orders=orders, times=times)
         if isinstance(motion, RingDown):
             return of_ring_down(motion, paths, orders, times)

@@ -24,7 +24,7 @@ NOT_IN_DERIVATIVES: dict[str, str] = {
 }
 
 
-#: what a motion has that is not a figure, with derivatives "<name>_derivative"; all but the first one are series
+#: data of a motion, with derivatives "<name>_derivative"; all but the first one are series
 SERIES = ("state", "peak", "impact_time", "impact_speed", "motion")
 
 

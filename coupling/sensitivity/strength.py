@@ -1,6 +1,6 @@
 """Strength of the contacts of a motion, and how numbers change it: Hertz's collisions, as of strength.contact_strength.
 
-Of rigid contacts: a compliant one tells its force by its duration and its impulse, which are not followed.
+Of rigid contacts: of a compliant one it takes duration and impulse, which are not followed.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.derivatives.dynamics import Dynamics
-from vanedamp.coupling.derivatives.numbers import Numbers
+from vanedamp.coupling.derivatives.dynamics import ScaledDynamics
+from vanedamp.coupling.derivatives.numbers import Parameters
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sensitivity.peaks import Found, largest
 from vanedamp.coupling.strength.contact_strength import loaded, wanted
@@ -30,20 +30,20 @@ class Worst(NamedTuple):
 class Struck:
     """The impacts of a scene with a rounded pair: their speeds, m/s, and energies, J."""
 
-    def __init__(self, dynamics: Dynamics, numbers: Numbers) -> None:
+    def __init__(self, dynamics: ScaledDynamics, numbers: Parameters) -> None:
         self._scene, self._numbers = dynamics.frame.scene, numbers
         self.speeds, self.energies = Found(), Found()
 
     @staticmethod
     def wanted(scene: Scene) -> bool:
-        """Whether a scene tells the strength of rigid contacts."""
+        """Whether a scene has strength of rigid contacts."""
         return wanted(scene) and scene.contact.rigid
 
     def strike(self, speed: Dual, after: Dual, impulse: Dual) -> None:
         """Take an impact: speeds of approach and of separation, m/s, and impulse, N s."""
         energy = 0.5 * impulse / (speed + after) * speed * speed
-        for one, found in ((speed, self.speeds), (energy, self.energies)):
-            found.append((float(one.value), one.turns))
+        for one, strikes in ((speed, self.speeds), (energy, self.energies)):
+            strikes.append((float(one.value), one.turns))
 
     def worst(self) -> tuple[list[Worst] | None, bool]:
         """Return the worst of all contacts, none without impacts, and whether derivatives hold on one side.
@@ -53,16 +53,16 @@ class Struck:
         if not self.energies:
             return [], False
         number = len(self._numbers)
-        (energy, one), (fastest, other) = (largest(found, number) for found in (self.energies, self.speeds))
+        (energy, one), (fastest, other) = (largest(strikes, number) for strikes in (self.energies, self.speeds))
         at = float(energy.value)
         try:
             here = _strength(self._scene, at)
             by_energy = derivative(lambda e: _strength(self._scene, e) / here, at, at, np.ones(len(here))) * here
-            own = self._numbers.of_scene(lambda scene: _strength(scene, at), here)
+            slope = self._numbers.of_scene(lambda scene: _strength(scene, at), here)
         except (ValueError, NotSmooth):
             return None, False
-        told = Dual(here, own + np.multiply.outer(by_energy, energy.turns))
-        return [Worst(told[0], told[1], told[2] if len(here) > 2 else None, fastest)], one or other
+        worst = Dual(here, slope + np.multiply.outer(by_energy, energy.turns))
+        return [Worst(worst[0], worst[1], worst[2] if len(here) > 2 else None, fastest)], one or other
 
 
 def _strength(scene: Scene, energy: float) -> np.ndarray:

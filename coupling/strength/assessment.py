@@ -37,40 +37,36 @@ def assessed(
     amplitudes: by criterion, "von_mises" and "principal"; those with "_max", if there are any, give "utilisation_max"
     static: (6,) stress about which the motion vibrates; the criterion's number of it is the mean stress
     cycles: counted about it; without them, or without a curve, there is no life
-    duration: of what is counted, s, if it goes on so: then the life is "life_hours"; None: of a motion that happens now
+    duration: counted, s, if repeated: then the life is "life_hours"; None: of a motion that happens now
     and then, whose life is "life_repeats", how often
     """
     mean = mean_stress(fatigue, static)
     amplitude = amplitudes[fatigue.criterion]
-    found: dict[str, Any] = {
+    results: dict[str, Any] = {
         "criterion": fatigue.criterion, "mean_line": fatigue.mean_stress, "amplitude": amplitude, "mean": mean,
         "equivalent_amplitude": float(equivalent_amplitude(amplitude, mean, fatigue)),
     } | {name: float(value) for name, value in used(amplitude, mean, fatigue).items()}  # fmt: skip
     if (most := amplitudes.get(f"{fatigue.criterion}_max")) is not None:
-        found["utilisation_max"] = float(utilisation(most, mean, fatigue))
+        results["utilisation_max"] = float(utilisation(most, mean, fatigue))
     if cycles is not None and fatigue.exponent is not None:
-        found["damage"] = total = damage(cycles, fatigue, mean)
+        results["damage"] = total = damage(cycles, fatigue, mean)
         if duration is None:
-            found["life_repeats"] = quantiles(starts(total), fatigue)
+            results["life_repeats"] = quantiles(starts(total), fatigue)
         else:
-            found["damage_per_hour"] = 3600.0 * total / duration
-            found["life_hours"] = quantiles(hours(total, duration), fatigue)
-    return found
+            results["damage_per_hour"] = 3600.0 * total / duration
+            results["life_hours"] = quantiles(hours(total, duration), fatigue)
+    return results
 
 
 def used(amplitude: np.ndarray | float, mean: float, fatigue: Fatigue) -> dict[str, np.ndarray]:
     """Return the utilisation of stress amplitudes, Pa, and that of the yield strength if there is one."""
     of_yield = yield_utilisation(amplitude, mean, fatigue)
-    found = {"utilisation": utilisation(amplitude, mean, fatigue)}
-    return found if of_yield is None else found | {"yield_utilisation": of_yield}
+    ratios = {"utilisation": utilisation(amplitude, mean, fatigue)}
+    return ratios if of_yield is None else ratios | {"yield_utilisation": of_yield}
 
 
 def with_strength(
-    stress: SpotStress,
-    material: Fatigue | None,
-    cycles: Cycles | None,
-    noise: Mapping[str, Moments],
-    duration: float,
+    stress: SpotStress, material: Fatigue | None, cycles: Cycles | None, noise: Mapping[str, Moments], duration: float
 ) -> SpotStress:
     """Return the stress of a spot with utilisation and life; cycles: counted over a duration, s.
 
@@ -81,14 +77,14 @@ def with_strength(
         return stress
     amplitudes = {f"{name}{of}": getattr(stress, f"{name}{of}") for name in SCALARS for of in ("", "_max")}
     static = stress.mean if stress.static is None else stress.static
-    found = {"mean_known": stress.static is not None} | assessed(material, amplitudes, static, cycles, duration)
+    strength = {"mean_known": stress.static is not None} | assessed(material, amplitudes, static, cycles, duration)
     if noise and material.exponent is not None:
         rules = {"narrow_band": narrow_band_damage, "dirlik": dirlik_damage}
-        found["noise"] = {
-            curve: {f"{name}_per_hour": rule(of, 3600.0, material, found["mean"]) for name, rule in rules.items()}
+        strength["noise"] = {
+            curve: {f"{name}_per_hour": rule(of, 3600.0, material, strength["mean"]) for name, rule in rules.items()}
             for curve, of in noise.items()
         }
-    return replace(stress, strength=found)
+    return replace(stress, strength=strength)
 
 
 def mean_stress(fatigue: Fatigue, static: np.ndarray) -> float:

@@ -74,9 +74,9 @@ def _of_scene(
     pair = scene.contact.pair
     if pair is None:
         raise InputError(f"{name}: contact.pair: missing; give young and radius, or length and area, of what touches")
-    found: dict[tuple[float, float], ContactNumbers] = {}
+    by_pair: dict[tuple[float, float], ContactNumbers] = {}
     for label, reduced, stiffness in _walls(scene):
-        if (reduced, stiffness) in found:
+        if (reduced, stiffness) in by_pair:
             continue
         try:
             numbers = contact_numbers(pair, reduced, speeds, preload, label)
@@ -85,10 +85,10 @@ def _of_scene(
         if numbers.patch is not None and scene.contact.takes_residual_flexibility:
             wall = 1 / stiffness - scene.contact.flexibility(reduced)
             numbers.patch.update({"wall_flexibility": wall, "stiffness": stiffness})
-        found[reduced, stiffness] = numbers
-    if not found:
+        by_pair[reduced, stiffness] = numbers
+    if not by_pair:
         raise InputError(f"{name}: damper: no body meets a wall; a contact is that of a body")
-    return tuple(found.values())
+    return tuple(by_pair.values())
 
 
 def _walls(scene: Scene) -> list[tuple[str, float, float]]:

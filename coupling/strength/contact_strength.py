@@ -22,7 +22,7 @@ from vanedamp.coupling.scene.contact_laws.compliant import peak_over_mean
 from vanedamp.coupling.scene.scene import Scene
 
 
-class Impacts(NamedTuple):
+class ContactImpacts(NamedTuple):
     """Impacts (k,) of one contact.
 
     entry: place in the contact's log; speed, after: m/s, before and after; impulse: N s; duration: s, nan: not known;
@@ -38,7 +38,7 @@ class Impacts(NamedTuple):
 
 
 def wanted(scene: Scene) -> bool:
-    """Whether a scene says what touches, with a rounded contact."""
+    """Whether a scene has materials and a rounded contact."""
     return scene.contact.pair is not None and scene.contact.pair.radius is not None
 
 
@@ -51,32 +51,32 @@ def contacts_of(scene: Scene, run: Outcome, begin: float = 0.0) -> tuple[Contact
     assert pair is not None
     contact = pair.contact
     assert contact is not None
-    entries, one_of = entries_of(run.rows, run.log), {place: row for row, place in enumerate(places)}
+    entries, one_of = entries_of(run.rows, run.log), {key: row for row, key in enumerate(places)}
     entries = entries[(entries[:, 1] == IMPACT) | (entries[:, 1] == DETACHES)]
-    rows = np.array([one_of[place] for place in places], int)[entries[:, 2].astype(int)]
-    found: dict[int, ContactStrength] = {}
+    rows = np.array([one_of[key] for key in places], int)[entries[:, 2].astype(int)]
+    by_entry: dict[int, ContactStrength] = {}
     for row in np.unique(rows):
-        own = np.flatnonzero(rows == row)
-        impacts = impacts_of(entries[own], not scene.contact.rigid, begin)
+        hits = np.flatnonzero(rows == row)
+        impacts = impacts_of(entries[hits], not scene.contact.rigid, begin)
         if len(impacts.entry):
-            found[int(own[impacts.entry[0]])] = _strength(places[row], impacts, contact, pair.first_yield)
-    return tuple(found[first] for first in sorted(found))
+            by_entry[int(hits[impacts.entry[0]])] = _strength(places[row], impacts, contact, pair.first_yield)
+    return tuple(by_entry[first] for first in sorted(by_entry))
 
 
 def _strengths(scene: Scene, run: Outcome, known: Fields) -> Fields:
     assert scene.contact.pair is not None
     try:
-        found = contacts_of(scene, run, known["transient"] / scene.frequency)
+        contacts = contacts_of(scene, run, known["transient"] / scene.frequency)
     except ValueError as error:
         return {"warnings": (f"contact.pair: {error}",)}
-    return {"contacts": found, "warnings": tuple(_warnings(found, scene.contact.pair.restitution_speeds))}
+    return {"contacts": contacts, "warnings": tuple(_warnings(contacts, scene.contact.pair.restitution_speeds))}
 
 
 #: keeps the strength of rounded contacts
 CONTACTS = Observer(_strengths, Needs(log=True))
 
 
-def impacts_of(entries: np.ndarray, compliant: bool, begin: float) -> Impacts:
+def impacts_of(entries: np.ndarray, compliant: bool, begin: float) -> ContactImpacts:
     """Return the impacts from a time on, s, in the log's entries (n, .) of one contact: impacts and ends.
 
     Springs in parallel, which close one in another, are one impact.
@@ -92,17 +92,17 @@ def impacts_of(entries: np.ndarray, compliant: bool, begin: float) -> Impacts:
         ends = ~hits & (closed == 0) & np.r_[False, closed[:-1] == 1]
         impact = np.cumsum(begins) - 1
         ended, of_spring = impact[ends], impact[hits]
-        place = np.flatnonzero(begins)[ended]
-        end[place], one[place] = time[ends], np.bincount(of_spring)[ended] == 1
-        impulse[place] = np.bincount(of_spring, impulse[hits])[ended]
+        at = np.flatnonzero(begins)[ended]
+        end[at], one[at] = time[ends], np.bincount(of_spring)[ended] == 1
+        impulse[at] = np.bincount(of_spring, impulse[hits])[ended]
     until = np.where(counts & ~one, np.fmax(end, time), -np.inf)
     counts[1:] &= time[1:] >= np.maximum.accumulate(until)[:-1]
     columns = np.arange(len(time)), speed, after, impulse, end - time, one & (end > time)
-    return Impacts(*(column[counts] for column in columns))
+    return ContactImpacts(*(column[counts] for column in columns))
 
 
 def _strength(
-    place: tuple[int, str, int], impacts: Impacts, contact: Contact, first_yield: float | None
+    key: tuple[int, str, int], impacts: ContactImpacts, contact: Contact, first_yield: float | None
 ) -> ContactStrength:
     """Return the strength of one contact, from its impacts."""
     _, speed, after, impulse, durations, one = impacts
@@ -119,7 +119,7 @@ def _strength(
         limit = contact.energy(contact.force_of_pressure(first_yield))
         utilisation, yielding = used[0], int(np.sum(energy > limit)) / len(energy)
     return ContactStrength(
-        *place, len(energy), float(speed.max()), force, duration, pressure, utilisation, yielding
+        *key, len(energy), float(speed.max()), force, duration, pressure, utilisation, yielding
     )  # fmt: skip
 
 

@@ -34,9 +34,9 @@ def turning_points(history: np.ndarray) -> np.ndarray:
 
 
 def rainflow_cycles(history: np.ndarray, repeats: bool = False) -> Cycles:
-    """Return the cycles of a history (t,) in the order in which they close.
+    """Return the cycles of a history (t,) in the order they close.
 
-    repeats: the history is one period of a motion that goes on; it is counted from its largest value to this value
+    repeats: the history is one period of a motion that repeats; it is counted from its largest value to this value
     again, so that the ranges left are one closed cycle (section 5.4.5).
 
     Raises InputError for values that are not finite, or none.
@@ -48,7 +48,7 @@ def rainflow_cycles(history: np.ndarray, repeats: bool = False) -> Cycles:
         history = np.roll(history, -int(np.argmax(history)))
         history = np.append(history, history[0])
     points = history[turning_points(history)].tolist()
-    found = [cycle[:3] for cycle in rainflow.extract_cycles(points)]
+    cycles = [cycle[:3] for cycle in rainflow.extract_cycles(points)]
     if len(points) == 2:  # two points are one range, a half cycle by section 5.4.4 (4), which the package leaves out
-        found = [(abs(points[1] - points[0]), 0.5 * (points[0] + points[1]), 0.5)]
-    return Cycles(*np.array(found, dtype=float).reshape(-1, 3).T)
+        cycles = [(abs(points[1] - points[0]), 0.5 * (points[0] + points[1]), 0.5)]
+    return Cycles(*np.array(cycles, dtype=float).reshape(-1, 3).T)

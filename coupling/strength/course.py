@@ -19,7 +19,7 @@ _VON_MISES, _PRINCIPAL = 6, 7
 #: columns of a period's rows: the time of the piece, a measure and its slopes, a bound of its second derivative, the
 #: product with the largest stress
 _AHEAD, _VALUE, _UP, _DOWN, _BENDS, _GOES, _COLUMNS = range(7)
-#: what a cubic through the ends of a piece may miss of a peak: the square of the second derivative over it, times this
+#: error of a peak by a cubic through the ends of a piece: the square of the second derivative over it, times this
 _BEND = 0.05
 #: of a bound
 _ROUND_OFF = 1e-14
@@ -32,17 +32,17 @@ _SURE = 1e-10
 #: difference of principal stresses over the third's, below which they are equal
 _EQUAL = 1e-10
 _TINY = float(np.finfo(float).tiny)
-#: places within a piece, over its length, at which histories are sampled
+#: points within a piece, over its length, at which histories are sampled
 _SAMPLED = np.arange(4) / 4
 
 
 def course_stress(course: np.ndarray, rows: np.ndarray) -> PeriodStress:
     """Return the stress of the periods p of a course (n, 2 + 4k); rows: (s, 6, k) Pa per output."""
     counts, spots = np.diff(np.flatnonzero(np.diff(course[:, 0], prepend=-1.0, append=np.inf))), len(rows)
-    found = PeriodStress(np.zeros((len(counts), spots, len(MEASURES))), np.zeros((len(counts), spots, 6)))
+    stress = PeriodStress(np.zeros((len(counts), spots, len(MEASURES))), np.zeros((len(counts), spots, 6)))
     outputs, places, columns = (np.empty((size, counts.max(initial=0))) for size in (4 * rows.shape[2], 24, _COLUMNS))
-    _measure(course, rows, outputs, places, columns, np.zeros((3, 6)), *found)
-    return found
+    _measure(course, rows, outputs, places, columns, np.zeros((3, 6)), *stress)
+    return stress
 
 
 def sampled_course(course: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -50,7 +50,7 @@ def sampled_course(course: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np
     size, begins = rows.shape[-1], np.flatnonzero(course[:, 1])
     ahead = course[begins, 1]
     parts = [course[begins + end, 2 + d * size :][:, :size] * (ahead**d)[:, None] for end in (0, 1) for d in range(4)]
-    weights = np.array([_weights(place)[:8] for place in _SAMPLED.tolist()])
+    weights = np.array([_weights(node)[:8] for node in _SAMPLED.tolist()])
     outputs = np.einsum("uw,wpk->puk", weights, np.array(parts)).reshape(-1, size)
     return np.repeat(course[begins, 0], len(_SAMPLED)), np.moveaxis(outputs @ np.swapaxes(rows, 1, 2), 1, 2)
 
@@ -292,7 +292,7 @@ def _piece(places, goes, point, i, kind, sign, side, top):
 
 @kernel
 def _peak(places, point, i, a, value_a, slope_a, b, value_b, slope_b, kind, sign, side, top):
-    """Return the value where the slope vanishes between a and b, or what there was.
+    """Return the value where the slope vanishes between a and b, or the old one.
 
     By Newton's method from the cubic through the ends, with its curvature: what a step still gains is right to some
     hundredths.
@@ -307,13 +307,13 @@ def _peak(places, point, i, a, value_a, slope_a, b, value_b, slope_b, kind, sign
         _, value, slope, _ = _at(places, point, i, t, kind, sign, side)
         curve = (bend + 2.0 * third * (t - begin) / h) / (h * h)
         gain = -0.5 * slope * slope / curve if curve < 0.0 else math.inf
-        found = gain <= _SURE * value
-        height = value + gain if found else value
+        sure = gain <= _SURE * value
+        height = value + gain if sure else value
         if height > top:
             top = height
             if kind == _VON_MISES and side == 0.0:
                 _copy(point[2], point[0])
-        if found:
+        if sure:
             break
         if slope > 0.0:
             a, slope_a = t, slope
@@ -457,5 +457,5 @@ def _along(point, value):
     total = r[0] + r[1] + r[2]
     if single == 0.0:
         return total / 3.0
-    own = (r[0] * a + r[1] * b + r[2] * c + 2.0 * (r[3] * d + r[4] * e + r[5] * f)) / single
-    return 0.5 * (total - own)
+    along = (r[0] * a + r[1] * b + r[2] * c + 2.0 * (r[3] * d + r[4] * e + r[5] * f)) / single
+    return 0.5 * (total - along)

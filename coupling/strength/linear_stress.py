@@ -1,4 +1,4 @@
-"""Amplitudes of stress of the linear structure, without bodies and with every body fixed to its floor."""
+"""Amplitudes of stress of the linear structure, without bodies and with bodies fixed."""
 
 from __future__ import annotations
 

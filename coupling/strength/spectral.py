@@ -99,35 +99,35 @@ def spectral_density(
     return frequency, density.sum(axis=0)
 
 
-def narrow_band_damage(found: Moments, duration: float, fatigue: Fatigue, mean: float = 0.0) -> float:
+def narrow_band_damage(spectrum: Moments, duration: float, fatigue: Fatigue, mean: float = 0.0) -> float:
     """Return Miner's sum over a duration, s, of a narrow band, whose peaks are Rayleigh's; mean: stress, Pa.
 
     With one exponent it is the closed form above. With a knee each side has its incomplete gamma function. Source:
     Miles (1954).
     """
-    if not found.l0 > 0.0:
+    if not spectrum.l0 > 0.0:
         return 0.0
-    return found.crossings * duration * _rayleigh_damage(math.sqrt(found.l0), fatigue, mean)
+    return spectrum.crossings * duration * _rayleigh_damage(math.sqrt(spectrum.l0), fatigue, mean)
 
 
-def dirlik_damage(found: Moments, duration: float, fatigue: Fatigue, mean: float = 0.0) -> float:
+def dirlik_damage(spectrum: Moments, duration: float, fatigue: Fatigue, mean: float = 0.0) -> float:
     """Return Miner's sum over a duration, s, of rainflow cycles by Dirlik's density; mean: stress, Pa.
 
     Source: Dirlik, Application of computers in fatigue analysis (thesis, Warwick 1985): an exponential and two Rayleigh
     densities of the amplitude over the standard deviation, fitted to simulated histories.
     """
-    irregularity = found.irregularity if found.l0 > 0.0 else 1.0
+    irregularity = spectrum.irregularity if spectrum.l0 > 0.0 else 1.0
     if 1.0 - irregularity < _NARROW:
-        return narrow_band_damage(found, duration, fatigue, mean)
-    deviation = math.sqrt(found.l0)
-    mean_frequency = found.l1 / found.l0 * math.sqrt(found.l2 / found.l4)
+        return narrow_band_damage(spectrum, duration, fatigue, mean)
+    deviation = math.sqrt(spectrum.l0)
+    mean_frequency = spectrum.l1 / spectrum.l0 * math.sqrt(spectrum.l2 / spectrum.l4)
     first = 2.0 * (mean_frequency - irregularity**2) / (1.0 + irregularity**2)
     rest = 1.0 - irregularity - first + first**2
     width = (irregularity - mean_frequency - first**2) / rest
     second = rest / (1.0 - width)
     third = 1.0 - first - second
     scale = 1.25 * (irregularity - third - second * width) / first
-    return found.peaks * duration * (
+    return spectrum.peaks * duration * (
         first * _mean_damage(scale * deviation, 1.0, fatigue, mean)
         + second * _rayleigh_damage(abs(width) * deviation, fatigue, mean)
         + third * _rayleigh_damage(deviation, fatigue, mean)

@@ -14,7 +14,7 @@ from vanedamp.coupling.strength.stress import scalar_stresses, signs
 
 
 class SpotHistories:
-    """Turning points of the criterion's stress at s spots, about the mean of what came first.
+    """Turning points of the criterion's stress at s spots, about the mean of the first periods.
 
     It counts as tensile where the stress goes with the largest one of these samples, if that is tensile. Spots without
     a curve of stress and life have no history.
@@ -26,12 +26,12 @@ class SpotHistories:
     def __init__(self, materials: Sequence[Fatigue | None]) -> None:
         self.wanted = any(material is not None and material.exponent is not None for material in materials)
         self._rows = {
-            place: SCALARS.index(material.criterion)
-            for place, material in enumerate(materials)
+            spot: SCALARS.index(material.criterion)
+            for spot, material in enumerate(materials)
             if material is not None and material.exponent is not None
         }
         self.mean, self._reference = np.zeros(0), np.zeros(0)
-        self._points: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {place: [] for place in self._rows}
+        self._points: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {spot: [] for spot in self._rows}
 
     def add(self, periods: np.ndarray, stress: np.ndarray, mean: np.ndarray) -> None:
         """Add samples (s, 6, t) of stress, Pa, in periods (t,), and their mean (s, 6)."""
@@ -48,17 +48,17 @@ class SpotHistories:
             largest = np.take_along_axis(about, worst[None, :, None], axis=-1)
             self._reference = np.copysign(1.0, largest_principal(largest)) * largest
         signed = signs(about, self._reference) * scalars
-        for place, row in self._rows.items():
-            kept = turning_points(signed[row, place])
-            self._points[place].append((periods[kept], signed[row, place, kept]))
+        for spot, row in self._rows.items():
+            turning = turning_points(signed[row, spot])
+            self._points[spot].append((periods[turning], signed[row, spot, turning]))
 
-    def cycles(self, place: int, first: int = 0, repeats: bool = False) -> Cycles | None:
+    def cycles(self, spot: int, first: int = 0, repeats: bool = False) -> Cycles | None:
         """Return the cycles of a spot from a period on; None without any sample, or a curve.
 
-        repeats: the motion repeats what is counted (counting.rainflow_cycles).
+        repeats: the counted motion repeats (counting.rainflow_cycles).
         """
-        if not self._points.get(place):
+        if not self._points.get(spot):
             return None
-        periods, values = (np.concatenate(arrays) for arrays in zip(*self._points[place], strict=True))
+        periods, values = (np.concatenate(arrays) for arrays in zip(*self._points[spot], strict=True))
         values = values[periods >= first]
         return rainflow_cycles(values, repeats) if values.size else None

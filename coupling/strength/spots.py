@@ -104,7 +104,7 @@ def samples_of(scene: Scene, system: System, spots: Spots, asked: int = 0) -> in
 
     An even one if possible, 16 per period of the highest harmonic at least, and so many that what impacts excite is
     missed by 1 % of the amplitude at most, but no more than 192. A mode misses at most its contribution, and
-    (h / 2)^2 / 6 of it if its phase advances by h between samples: the mean over the places of its peak. The
+    (h / 2)^2 / 6 of it if its phase advances by h between samples: the mean over positions of its peak. The
     contribution is that of an impact which reverses the velocity of the excited mode at a contact.
     """
     wanted = max(_LEAST, OF_HARMONIC * int(system.order.max(initial=1)))
@@ -133,7 +133,7 @@ def _impact_shares(system: System, spots: Spots) -> np.ndarray:
     """Return the stress (k, s, n) of modes after an impact of each contact, over that of the mode nearest to order 1.
 
     That mode moves the contact's places with a velocity, which an elastic impact of the masses in contact reverses. A
-    compliant contact takes half a period of these masses on its spring, and hardly excites what is faster.
+    compliant contact takes half a period of these masses on its spring, and hardly excites faster modes.
     """
     omega = np.sqrt(np.maximum(spots.squares, 0.0))
     contacts = np.abs(system.J[: system.contacts, : system.modes])

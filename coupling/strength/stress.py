@@ -18,7 +18,7 @@ _TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 
 class PeriodStress(NamedTuple):
-    """Stress within p periods at s places, Pa: amplitudes (p, s, 8) of MEASURES, and means (p, s, 6)."""
+    """Stress within p periods at s spots, Pa: amplitudes (p, s, 8) of MEASURES, and means (p, s, 6)."""
 
     amplitude: np.ndarray
     mean: np.ndarray

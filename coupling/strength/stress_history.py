@@ -38,6 +38,6 @@ def stress_history(scene: Scene, samples_per_period: int = 100) -> StressHistory
     response = respond(scene, [samples(samples_per_period)])
     if response.coordinates is None:
         raise InputError(f"solver.method: {scene.solver.method} keeps no samples of modal coordinates")
-    kept = slice(response.transient * samples_per_period, None)
-    stress = spots.stress(response.coordinates[kept])
-    return StressHistory(response.time[kept], stress, tuple(spots.facts), response.status)
+    rows = slice(response.transient * samples_per_period, None)
+    stress = spots.stress(response.coordinates[rows])
+    return StressHistory(response.time[rows], stress, tuple(spots.facts), response.status)

@@ -65,7 +65,7 @@ class StressObserver(Observer):
             self._take_samples(run.outcome())
 
     def _take_course(self, course: np.ndarray, last: int | None = None) -> int:
-        """Take what there is of a course: groups of periods that are whole, or all up to the last. Return its rows."""
+        """Take a course's groups of periods that are whole, or all up to the last. Return its rows."""
         periods = course[:, 0]
         if not len(periods):
             return 0
@@ -73,10 +73,10 @@ class StressObserver(Observer):
         while first < last:
             next_one = min((first // _TOGETHER + 1) * _TOGETHER, last)
             rows = course[slice(*np.searchsorted(periods, (first, next_one)))]
-            found = course_stress(rows, self.spots.outputs[1])
-            self._parts.append((first, found))
+            stress = course_stress(rows, self.spots.outputs[1])
+            self._parts.append((first, stress))
             if self._histories.wanted:
-                self._histories.add(*sampled_course(rows, self.spots.outputs[1]), found.mean.mean(axis=0))
+                self._histories.add(*sampled_course(rows, self.spots.outputs[1]), stress.mean.mean(axis=0))
             first = next_one
         return int(np.searchsorted(periods, last))
 
@@ -89,15 +89,15 @@ class StressObserver(Observer):
         # a sample more at both ends
         before, rows = q[max(begin * each - 1, 0)], q[begin * each : done * each]
         stress = self.spots.stress(np.concatenate([before[None], rows, rows[-1:]]))
-        found = period_stress(stress, each)
-        self._parts.append((begin, found))
+        of_periods = period_stress(stress, each)
+        self._parts.append((begin, of_periods))
         periods = np.repeat(np.arange(begin, done), each)
         self._histories.add(periods, stress[..., 1:-1], stress[..., 1:-1].mean(axis=-1))
-        few = min(_CHECKED, len(found.mean))
+        few = min(_CHECKED, len(of_periods.mean))
         if each % 2 == 0:
             halved = period_stress(every_other(stress[..., : few * each + 2]), each // 2)
-            for total, part in zip(self._checked, (found, halved), strict=True):
-                total += part.amplitude[:few, :, MEASURES.index("von_mises")].sum(axis=0)
+            for total, each_stress in zip(self._checked, (of_periods, halved), strict=True):
+                total += each_stress.amplitude[:few, :, MEASURES.index("von_mises")].sum(axis=0)
 
     def _stress(self, scene: Scene, run: Outcome, known: Fields) -> Fields:
         """Return the stress over the periods evaluated."""
@@ -105,9 +105,9 @@ class StressObserver(Observer):
             self._take_samples(run)
         else:
             self._take_course(run.records.course[: run.records.noted[0]], run.periods)
-        first, own, (all_of, half), histories = known["transient"], self._parts, self._checked, self._histories
+        first, pieces, (all_of, half), histories = known["transient"], self._parts, self._checked, self._histories
         self._begin_again()
-        parts = [PeriodStress(*(array[max(first - begin, 0) :] for array in part)) for begin, part in own]
+        parts = [PeriodStress(*(array[max(first - begin, 0) :] for array in piece)) for begin, piece in pieces]
         whole = PeriodStress(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True))) if parts else None
         if whole is None or not len(whole.mean):
             return {}
@@ -115,37 +115,37 @@ class StressObserver(Observer):
         linear = known.get("linear") or linear_stresses(scene, self.spots, run.system)
         spots = _spot_stresses(self.spots, whole, linear, self.each, error)
         repeats, duration = known["classification"] != "non-periodic", len(whole.mean) / scene.frequency
-        counted = [histories.cycles(place, first, repeats) for place in range(len(spots))]
+        counted = [histories.cycles(spot, first, repeats) for spot in range(len(spots))]
         noise = linear_moments(scene, self.spots) if isinstance(scene.excitation.waveform, Multisine) else {}
-        spectra = [{curve: of[place] for curve, of in noise.items()} for place in range(len(spots))]
+        spectra = [{curve: of[spot] for curve, of in noise.items()} for spot in range(len(spots))]
         parts_of = zip(spots, self.spots.materials, counted, spectra, strict=True)
         return {"stress": tuple(with_strength(*each, duration) for each in parts_of)}
 
 
 def _spot_stresses(
-    spots: Spots, found: PeriodStress, linear: Mapping[str, np.ndarray] | None, each: int, error: np.ndarray
+    spots: Spots, stress: PeriodStress, linear: Mapping[str, np.ndarray] | None, each: int, error: np.ndarray
 ) -> tuple[SpotStress, ...]:
-    """Return the stresses of the spots over the periods found, of `each` samples, with an error (s,) of these.
+    """Return the stresses of the spots over the periods, of `each` samples, with an error (s,) of these.
 
     linear: amplitudes (s, 8) by the names of LINEAR.
     """
     made = []
-    for place, (name, facts) in enumerate(spots.facts.items()):
-        mean, static, coordinates = found.mean[:, place].mean(axis=0), spots.static(name), facts.get("coordinates")
+    for spot, (name, facts) in enumerate(spots.facts.items()):
+        mean, static, coordinates = stress.mean[:, spot].mean(axis=0), spots.static(name), facts.get("coordinates")
         of: dict[str, Any] = {}
         for suffix, values in (
-            ("", found.amplitude[:, place].mean(axis=0)),
-            ("_max", found.amplitude[:, place].max(axis=0)),
+            ("", stress.amplitude[:, spot].mean(axis=0)),
+            ("_max", stress.amplitude[:, spot].max(axis=0)),
         ):
             of |= {f"amplitude{suffix}": named(values)}
             of |= {f"{name}{suffix}": value for name, value in scalars(values).items()}
-        of |= {curve: None if linear is None else scalars(linear[curve][place]) for curve in LINEAR}
+        of |= {curve: None if linear is None else scalars(linear[curve][spot]) for curve in LINEAR}
         made.append(
             SpotStress(
                 name=name, coordinates=None if coordinates is None else tuple(coordinates),
                 group=facts.get("group", ""), mean=mean, static=None if static is None else mean + static,
                 fatigue=facts.get("fatigue", {}), samples_per_period=each,
-                sampling_error=float(error[place]), mesh_error=facts.get("error"), **of,
+                sampling_error=float(error[spot]), mesh_error=facts.get("error"), **of,
             )
         )  # fmt: skip
     return tuple(made)

@@ -48,23 +48,23 @@ class StressSeries:
 
         The mean stress is that of the first or the last speed, where it is larger.
         """
-        largest, found = self.amplitudes().max(axis=0), dict[str, dict[str, Any]]()
-        for place, (name, material) in enumerate(zip(self.spots.facts, self.spots.materials, strict=True)):
+        largest, strengths = self.amplitudes().max(axis=0), dict[str, dict[str, Any]]()
+        for spot, (name, material) in enumerate(zip(self.spots.facts, self.spots.materials, strict=True)):
             if material is None:
                 continue
             known = [spots.static(name) for spots in (self.spots, self._last)]
-            rest = self._histories.mean[place] if self._histories.mean.size else np.zeros(6)
+            rest = self._histories.mean[spot] if self._histories.mean.size else np.zeros(6)
             static = max((rest if one is None else rest + one for one in known), key=lambda s: mean_stress(material, s))
-            cycles, every = self._histories.cycles(place), all(one is not None for one in known)
-            found[name] = {"mean_known": every} | assessed(material, scalars(largest[place]), static, cycles)
-        return found
+            cycles, every = self._histories.cycles(spot), all(one is not None for one in known)
+            strengths[name] = {"mean_known": every} | assessed(material, scalars(largest[spot]), static, cycles)
+        return strengths
 
     def of_spots(self, whole: bool = False) -> list[Any]:
-        """Return what quantities need of hot spots: of each period, (p,), or of the whole motion as of a run."""
-        amplitudes, found = self.amplitudes(), list[Any]()
-        for place, (name, material) in enumerate(zip(self.spots.facts, self.spots.materials, strict=True)):
-            own = dict(zip(MEASURES, amplitudes[:, place].T, strict=True))
-            level = {measure: values.mean() if whole else values for measure, values in own.items()}
+        """Return inputs of quantities of hot spots: of each period, (p,), or of the whole motion as of a run."""
+        amplitudes, results = self.amplitudes(), list[Any]()
+        for spot, (name, material) in enumerate(zip(self.spots.facts, self.spots.materials, strict=True)):
+            peaks = dict(zip(MEASURES, amplitudes[:, spot].T, strict=True))
+            level = {measure: values.mean() if whole else values for measure, values in peaks.items()}
             strength = dict.fromkeys(("utilisation", "yield_utilisation"), np.nan * level[SCALARS[0]])
             if material is not None:
                 most = self.strengths[name]
@@ -72,11 +72,11 @@ class StressSeries:
                 if whole:
                     by_largest = {"utilisation_max": "utilisation", "yield_utilisation": "yield_utilisation"}
                     strength |= {name: most[of] for name, of in by_largest.items() if of in most}
-            found.append(SimpleNamespace(
-                **level, **{f"{scalar}_max": own[scalar].max() for scalar in SCALARS}, strength=strength, mean=[],
+            results.append(SimpleNamespace(
+                **level, **{f"{scalar}_max": peaks[scalar].max() for scalar in SCALARS}, strength=strength, mean=[],
                 static=None, undamped=None, fixed=None, amplitude={name: level[name] for name in COMPONENTS},
             ))  # fmt: skip
-        return found
+        return results
 
     def _evaluate(self) -> None:
         if not self._waiting:

@@ -29,7 +29,7 @@ from vanedamp.coupling.engine.scenes import (
     OWN,
     PLACE,
     STAGE,
-    Job,
+    BatchArrays,
     new_job,
 )
 from vanedamp.coupling.methods.registry import run_of
@@ -59,12 +59,12 @@ _MOST = 4
 
 #: runs point k of a group by itself, from a state; returns the state that it leaves, None if it broke off
 Alone = Callable[[int, RestartState | None], RestartState | None]
-#: takes what is kept of point k beside its sums: its sections, and what observers have, by name
+#: takes data of point k besides its sums: its sections, and observers' data, by name
 Keep = Callable[[int, Mapping[str, Any]], None]
 
 
-class Kind:
-    """Scenes that differ from one of them in numbers with columns, and the run that takes them one after the other."""
+class SceneBatch:
+    """Scenes that differ from one in numbers with columns, and the run that takes them in turn."""
 
     def __init__(self, scene: Scene) -> None:
         """Take the first scene, without open choices. Raises InputError or ValueError for one that is no such scene."""
@@ -89,11 +89,11 @@ class Kind:
         linked: bool,
         alone: Alone,
         keep: Keep | None = None,
-    ) -> tuple[Job, np.ndarray, RestartState | None]:
+    ) -> tuple[BatchArrays, np.ndarray, RestartState | None]:
         """Run scenes (k,). Return the job with their results, linear amplitudes (k, 2), and the state they leave.
 
         values: of all paths; start: of the first of linked scenes, or of every scene (`left` then says how each ends);
-        alone: runs scenes that compiled code refuses, whose codes stay 0; keep: takes what is kept of every other one,
+        alone: runs scenes that compiled code rejects, whose codes stay 0; keep: takes the data of every other one,
         before the next begins.
         """
         run, size = self.run, len(next(iter(values.values())))
@@ -106,21 +106,21 @@ class Kind:
         for count in [size] if keep is None else range(1, size + 1):
             job.at[COUNT] = count
             while run.run_many(job, table, self.statistics) == OUTSIDE:
-                place = int(job.at[PLACE])
-                left = alone(place, self._left(job, place, first) if linked else None)
-                job.codes[place] = 0
+                index = int(job.at[PLACE])
+                left = alone(index, self._left(job, index, first) if linked else None)
+                job.codes[index] = 0
                 if linked:
                     for name in STARTS:
                         column = getattr(table, name)
-                        column[place + 1] = column[place] if left is None else getattr(left, name)
-                job.at[PLACE], job.at[STAGE] = place + 1, BEGINS
-                job.at[LEFT] = job.at[LEFT] if left is None else place + 1
+                        column[index + 1] = column[index] if left is None else getattr(left, name)
+                job.at[PLACE], job.at[STAGE] = index + 1, BEGINS
+                job.at[LEFT] = job.at[LEFT] if left is None else index + 1
             if keep is not None and job.codes[count - 1]:
                 keep(count - 1, self._parts(job, table, values, linear, count - 1))
-        amplitudes = np.transpose([curve.heights(own) for curve, own in zip(self.linear, motions, strict=True)])
+        amplitudes = np.transpose([curve.heights(motion) for curve, motion in zip(self.linear, motions, strict=True)])
         return job, amplitudes, self._left(job, size, first) if linked else None
 
-    def ended(self, job: Job, k: int) -> tuple[Status, str]:
+    def ended(self, job: BatchArrays, k: int) -> tuple[Status, str]:
         """Return how scene k of a job has ended, and the class of its motion."""
         unbalanced, made = (float(job.sums[k, SUMS.index(name)]) for name in ("unbalanced", "made"))
         status = closed_status(STATUS_OF[int(job.codes[k])], unbalanced, made, OPEN_LEDGER)
@@ -128,8 +128,8 @@ class Kind:
             status = levelled_status(status, in_plane(*job.plane[:, k]), self.run.linearisation)
         return status, class_name(int(job.kinds[k]))
 
-    def sources(self, job: Job, linear: np.ndarray, k: Any) -> dict[str, Any]:
-        """Return what quantities need of scene k of a job, or of several, (n, ...) each."""
+    def sources(self, job: BatchArrays, linear: np.ndarray, k: Any) -> dict[str, Any]:
+        """Return inputs of quantities of scene k of a job, or of several, (n, ...) each."""
         undamped, fixed = linear[k].T
         plane = in_plane(*job.plane[:, k]) if job.plane.size else {}
         return sources_of(job.sums[k]) | {"undamped": undamped, "fixed": fixed, "overlap": 0.0 * undamped} | plane
@@ -139,25 +139,25 @@ class Kind:
         return marked_with_speed(self.scene, self.run.start_in(k, k))
 
     def _parts(
-        self, job: Job, table: Columns, values: Mapping[str, np.ndarray], linear: Sequence[Any], k: int
+        self, job: BatchArrays, table: Columns, values: Mapping[str, np.ndarray], linear: Sequence[Any], k: int
     ) -> dict[str, Any]:
-        """Return what is kept of the run of scene k, which has just ended, by name."""
+        """Return the data kept of the run of scene k, just ended, by name."""
         run = self.run.outcome()
         first, b = min(int(job.at[DROPPED]), max(run.periods - 1, 0)), self.run.system.bodies
-        section, found = run.records.section[first : run.periods + 1], dict[str, Any](transient=0)
-        found |= {"section": section[:, :2], "slip": section[:, 3 : 3 + b], "slip_velocity": section[:, 3 + b :]}
+        section, fields = run.records.section[first : run.periods + 1], dict[str, Any](transient=0)
+        fields |= {"section": section[:, :2], "slip": section[:, 3 : 3 + b], "slip_velocity": section[:, 3 + b :]}
         if self.observers:
             scene = with_numbers(self.scene, self._data, {path: float(numbers[k]) for path, numbers in values.items()})
             run, known = replace(run, system=self.run.whole_in(table, k)), dict[str, Any](transient=first)
             known["energy"] = {name: float(job.sums[k, SUMS.index(name)]) for name in ENERGIES}
             known |= {"classification": class_name(int(job.kinds[k]))} | ({"linear": linear[k]} if linear else {})
-            found |= dict.fromkeys(PARTS)
+            fields |= dict.fromkeys(PARTS)
             for observer in self.observers:
-                found |= observer.fields(scene, run, known)
-        return found
+                fields |= observer.fields(scene, run, known)
+        return fields
 
     def _columns(
-        self, values: Mapping[str, np.ndarray], given: Sequence[RestartState], linked: bool, job: Job
+        self, values: Mapping[str, np.ndarray], given: Sequence[RestartState], linked: bool, job: BatchArrays
     ) -> Columns:
         """Return the columns of scenes; of linked ones with a row more, for the state that the last one leaves.
 
@@ -177,21 +177,21 @@ class Kind:
                 job.codes[k] = OUTSIDE
         return table
 
-    def _left(self, job: Job, place: int, start: RestartState | None) -> RestartState | None:
+    def _left(self, job: BatchArrays, index: int, start: RestartState | None) -> RestartState | None:
         """Return the state with which linked scene k begins: that of the last one before that has left one."""
         left = int(job.at[LEFT])
-        return start if left == 0 else marked_with_speed(self.scene, self.run.start_in(place, left - 1))
+        return start if left == 0 else marked_with_speed(self.scene, self.run.start_in(index, left - 1))
 
     def _motions(self, table: Columns, values: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the linear motions (2, k, e, n) without bodies and with fixed ones."""
         size, n = len(next(iter(values.values()))), self.run.system.modes
-        frequency, found = values.get(FREQUENCY, np.full(size, self.scene.frequency)), []
+        frequency, motions = values.get(FREQUENCY, np.full(size, self.scene.frequency)), []
         for response in self.linear:
             load = None
             if any(path in values for path in LEVELS):
                 load = table.load[:size, np.isin(self.run.whole.order, response.order), :n]
-            found.append(response.motions(frequency, load))
-        return np.array(found)
+            motions.append(response.motions(frequency, load))
+        return np.array(motions)
 
 
 def _own(record: Any) -> Any:
@@ -200,17 +200,17 @@ def _own(record: Any) -> Any:
 
 
 class _Kept(threading.local):
-    """The kinds that ran last in a thread, by what they were made of, the last one behind."""
+    """The kinds that ran last in a thread, by key, the last one behind."""
 
     def __init__(self) -> None:
-        self.kinds: dict[bytes, Kind | None] = {}
+        self.kinds: dict[bytes, SceneBatch | None] = {}
 
 
 _KEPT = _Kept()
 
 
 class Common(NamedTuple):
-    """What the kinds of a maker's points have in common: scene and choices as bytes, and the files that it names."""
+    """Common to the kinds of a maker's points: scene and choices as bytes, and the files that it names."""
 
     made_of: bytes
     files: list[str]
@@ -221,7 +221,9 @@ class Common(NamedTuple):
         return cls(pickle.dumps((maker.base, maker.choices)), maker.base.files)
 
 
-def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str], common: Common | None = None) -> Kind | None:
+def kind_of(
+    maker: Points, point: Mapping[str, Any], paths: list[str], common: Common | None = None
+) -> SceneBatch | None:
     """Return the kind of a point's scene; None where it has to be run by itself. The last ones are kept.
 
     common: of the maker, where it is known.
@@ -236,11 +238,11 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str], common: C
         kinds[key] = kinds.pop(key)
         return kinds[key]
     kinds[key] = None
-    with suppress(InputError, ValueError):  # its own run says what is wrong
+    with suppress(InputError, ValueError):  # its own run reports the error
         chosen = maker.chosen(point)
         # other values may be in the way of a column
         if chosen.start is None and columned(chosen.scene, paths) == paths:
-            kinds[key] = Kind(chosen.scene)
+            kinds[key] = SceneBatch(chosen.scene)
     if len(kinds) > _MOST:
         del kinds[next(iter(kinds))]
     return kinds[key]
@@ -249,7 +251,7 @@ def kind_of(maker: Points, point: Mapping[str, Any], paths: list[str], common: C
 def are_scenes(maker: Points, first: Mapping[str, Any], numbers: Mapping[str, np.ndarray]) -> bool:
     """Return whether the ends of all numbers (k,) are those of scenes. Between them others are, too: bounds are linear.
 
-    What bounds numbers by others, places by gaps, compiled code sees in the start.
+    Bounds by other numbers (positions by gaps) are checked at the start.
     """
     try:
         for path, values in numbers.items():
@@ -262,29 +264,29 @@ def are_scenes(maker: Points, first: Mapping[str, Any], numbers: Mapping[str, np
 
 def without_starts(paths: Iterable[str]) -> list[str]:
     """Return the paths that say more than how a run begins."""
-    return [path for path in paths if not any(part in path for part in _OF_STARTS)]
+    return [path for path in paths if not any(key in path for key in _OF_STARTS)]
 
 
 def keys(points: PointTable, paths: Iterable[str]) -> list[tuple[Any, ...]]:
-    """Return of every point what its scene has in common with those that differ from it in numbers with columns."""
-    kept = points.columns
-    telling = [values for path, values in kept.items() if path not in paths]
-    telling += [np.asarray(kept[path]) > 0.0 for path in paths if path in kept and tells(path)]
+    """Return each point's key: scenes of one key differ in numbers with columns only."""
+    columns = points.columns
+    telling = [values for path, values in columns.items() if path not in paths]
+    telling += [np.asarray(columns[path]) > 0.0 for path in paths if path in columns and tells(path)]
     return list(zip(*telling, strict=True)) if telling else [()] * len(points)
 
 
 def groups(base: Scene, points: PointTable, linked: bool) -> Iterator[tuple[list[str], list[int]]]:
-    """Yield the paths with columns, and the places of points that differ only in these; linked ones in turn."""
-    kept = points.columns
-    paths = [path for path in columned(base, kept) if all(isinstance(value, int | float) for value in kept[path])]
+    """Yield the paths with columns, and the indices of points that differ only in these; linked ones in turn."""
+    columns = points.columns
+    paths = [path for path in columned(base, columns) if all(isinstance(value, int | float) for value in columns[path])]
     paths = without_starts(paths) if linked else paths
     key = keys(points, paths)
     if not paths or Row(base).alone:
-        yield from (([], [place]) for place in range(len(points)))
+        yield from (([], [index]) for index in range(len(points)))
     elif linked:
         yield from ((paths, list(some)) for _, some in itertools.groupby(range(len(points)), key.__getitem__))
     else:
-        found: dict[tuple[Any, ...], list[int]] = {}
-        for place in range(len(points)):
-            found.setdefault(key[place], []).append(place)
-        yield from ((paths, some) for some in found.values())
+        by_key: dict[tuple[Any, ...], list[int]] = {}
+        for index in range(len(points)):
+            by_key.setdefault(key[index], []).append(index)
+        yield from ((paths, some) for some in by_key.values())

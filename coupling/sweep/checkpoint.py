@@ -18,15 +18,15 @@ from vanedamp.files.store import Variable
 from vanedamp.files.toml_input import InputError
 
 
-class Checkpoint(SceneCheckpoint):
+class SweepCheckpoint(SceneCheckpoint):
     """Finished points, in memory and in a file (path None: in memory only)."""
 
     def __init__(self, path: str | Path | None, scene: Scene, size: int, provenance: Mapping[str, Any]) -> None:
         """Take up the file's points. Raises InputError for a file of another sweep, or one that cannot be read."""
         self.finished = SweepTable(size, Row(scene))
         super().__init__(path, "sweep-checkpoint", scene, provenance)
-        if (found := self.read()) is not None:
-            self._take(str(path), found[0])
+        if (saved := self.read()) is not None:
+            self._take(str(path), saved[0])
 
     def add(self, task: Task, result: TaskResult, more: bool) -> None:
         """Take over a task's points; more: whether its chain continues. Raises StoreError, such as for a full disk."""
@@ -36,14 +36,14 @@ class Checkpoint(SceneCheckpoint):
     def content(self) -> tuple[dict[str, Variable], dict[str, Any], str]:
         """Return variables of the file, and how many points are finished, in words."""
         finished, done = self.finished, np.flatnonzero(self.finished.done)
-        # a copy of most of a million points would take as much memory as all of them
-        kept = slice(None) if 2 * len(done) > len(finished.done) else done
+        # a copy of most of a million points would take as much memory as all
+        rows = slice(None) if 2 * len(done) > len(finished.done) else done
         states = {str(number): state.to_list() for number, state in finished.states.items()}
         texts = np.array([json.dumps(finished.texts), json.dumps(states)], object)
         variables = {
             "point": Variable(done, ("point",)),
-            "values": Variable(finished.values.T[:, kept], ("column", "kept")),
-            "codes": Variable(finished.codes[kept], ("kept", "text")),
+            "values": Variable(finished.values.T[:, rows], ("column", "kept")),
+            "codes": Variable(finished.codes[rows], ("kept", "text")),
             "texts_and_states": Variable(texts, ("entry",)),
         }
         return variables, {}, f"{finished.count} of {len(finished.done)} points are finished"
@@ -56,6 +56,6 @@ class Checkpoint(SceneCheckpoint):
                 "done to it: move it away, or delete it to start again"
             )
         texts, states = (json.loads(entry) for entry in variables["texts_and_states"])
-        kept = done if values.shape[1] > len(done) else slice(None)
-        self.finished.put(done, values[:, kept].T, codes[kept], texts)
+        rows = done if values.shape[1] > len(done) else slice(None)
+        self.finished.put(done, values[:, rows].T, codes[rows], texts)
         self.finished.states = {int(number): RestartState.from_list(state) for number, state in states.items()}

@@ -11,7 +11,7 @@ from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.steady_states import is_start
 
-#: tables that are no design: what acts on it, how its contacts and their wear are modelled, how it is computed
+#: tables that are no design: loads, how its contacts and their wear are modelled, how it is computed
 _CIRCUMSTANCES = (
     "excitation", "gravity", "rotation", "contact", "wear", "time", "solver", "sweep", "ranges", "ensemble", "orbit",
     "ramp", "ring_down",
@@ -29,7 +29,7 @@ UNSURE = (Status.NOT_STEADY, Status.UNCERTAIN)
 def is_choice(path: str) -> bool:
     """Say whether a key of a scene is the designer's choice: a number of the structure, a cavity, a body, an element.
 
-    A start is none, nor what acts on the design, nor a number that is uncertain: a design is judged by the worst of
+    A start is none, nor loads, nor a number that is uncertain: a design is judged by the worst of
     these.
     """
     steps = path.split(".")
@@ -48,8 +48,8 @@ def relative_amplitudes(sweep: Sweep, heights: np.ndarray) -> np.ndarray:
         at = list(sweep.axes).index(swept)
         known = sweep.peaks.get(undamped_peak.name)
         top = top.max(axis=at, keepdims=True) if known is None else np.expand_dims(known, at)
-    found: np.ndarray = heights / np.where(np.isfinite(top) & (top > 0.0), top, np.nan)
-    return found
+    relative: np.ndarray = heights / np.where(np.isfinite(top) & (top > 0.0), top, np.nan)
+    return relative
 
 
 def points_of_designs(sweep: Sweep) -> list[list[int]]:
@@ -75,16 +75,16 @@ def amplitude_known(sweep: Sweep) -> np.ndarray:
 
 
 def ranked(design: Sequence[Hashable], heights: np.ndarray, known: np.ndarray, sure: np.ndarray) -> list[list[int]]:
-    """Return the members of each design by their places, the highest first, and designs by rising highest member.
+    """Return the members of each design by index, the highest first, and designs by rising highest member.
 
     design: what stands for that of each member; heights (n,): nan where there is none. At the end are designs with a
-    member that is not known (n,), since a peak that is missing is no low peak, or whose highest is not sure (n,).
+    member unknown (n,), since a peak that is missing is no low peak, or whose highest is not sure (n,).
     """
     members: dict[Hashable, list[int]] = {}
-    for place, key in enumerate(design):
-        members.setdefault(key, []).append(place)
+    for index, key in enumerate(design):
+        members.setdefault(key, []).append(index)
     low, high = np.nan_to_num(heights, nan=-np.inf).tolist(), np.nan_to_num(heights, nan=np.inf).tolist()
-    groups = [sorted(places, key=lambda place: -low[place]) for places in members.values()]
+    groups = [sorted(places, key=lambda index: -low[index]) for places in members.values()]
     return sorted(groups, key=lambda places: (not complete(places, known, sure), high[places[0]]))
 
 

@@ -26,7 +26,7 @@ from vanedamp.files.toml_input import InputError, nearest, validate
 _DIRECTION, _ALONG = "continuation.direction", "continuation.along"
 #: values that cannot change from one run to the next: their states would not fit
 _FIXED = ("structure.model", "structure.file", "structure.modes", "structure.natural", "structure.tolerance")
-#: tables of other commands, which no run of a sweep feels
+#: tables of other commands, which no run of a sweep uses
 _OF_OTHERS = ("orbit", "ramp", "ring_down")
 
 
@@ -43,13 +43,13 @@ class Points:
         return self.chosen(values).scene
 
     def chosen(self, values: Mapping[str, Any]) -> Chosen:
-        """Return the scene at a point with what was chosen for it. Raises InputError for a point that is no scene."""
+        """Return the scene at a point with its choices. Raises InputError for a point that is no scene."""
         return with_choices(self.raw(values), self.choices)
 
     def raw(self, values: Mapping[str, Any]) -> Scene:
         """Return the scene at a point with its choices open. Raises InputError for a point that is no scene."""
         try:
-            for path, value in values.items():  # each point sets the same places
+            for path, value in values.items():  # each point sets the same entries
                 assign(self._data, path, value)
             return validate(Scene, self._data, "scene")
         except InputError as error:
@@ -58,7 +58,7 @@ class Points:
 
 
 class PointTable(Sequence[dict[str, Any]]):
-    """Values of points by paths, in a column for each path: in place of mappings, of which a task has ten thousands."""
+    """Values of points by paths, in a column for each path: instead of mappings, of which a task has ten thousands."""
 
     def __init__(self, columns: Mapping[str, Sequence[Any]]) -> None:
         """Take columns (k,) by path."""
@@ -78,14 +78,14 @@ class PointTable(Sequence[dict[str, Any]]):
         """Return the number of points."""
         return len(next(iter(self.columns.values()), ()))
 
-    def __getitem__(self, place: Any) -> Any:
+    def __getitem__(self, index: Any) -> Any:
         """Return the values of a point by their paths."""
-        found = ((path, values[place]) for path, values in self.columns.items())
-        return {path: float(value) if isinstance(value, np.floating) else value for path, value in found}
+        items = ((path, values[index]) for path, values in self.columns.items())
+        return {path: float(value) if isinstance(value, np.floating) else value for path, value in items}
 
 
 class Chain(NamedTuple):
-    """Points in the order in which they run; each begins with the state of the one before if they are `linked`."""
+    """Points in the order they run; each begins with the state of the one before if they are `linked`."""
 
     points: Sequence[int]
     linked: bool
@@ -148,11 +148,11 @@ class Grid:
 
     def values(self, index: int) -> dict[str, Any]:
         """Return the values of the axes at a point, counted from 0 with the last axis fastest."""
-        found: dict[str, Any] = dict.fromkeys(self.axes)
-        for path in reversed(found):
-            index, place = divmod(index, len(self.axes[path]))
-            found[path] = self.axes[path][place]
-        return found
+        values: dict[str, Any] = dict.fromkeys(self.axes)
+        for path in reversed(values):
+            index, entry = divmod(index, len(self.axes[path]))
+            values[path] = self.axes[path][entry]
+        return values
 
     def table(self, points: Sequence[int]) -> PointTable:
         """Return the values of the axes at some points."""
@@ -160,7 +160,7 @@ class Grid:
             return PointTable({})
         places = np.unravel_index(np.asarray(points, np.int64), self.shape)
         axes = zip(self.axes.items(), places, strict=True)
-        return PointTable({path: [values[place] for place in own.tolist()] for (path, values), own in axes})
+        return PointTable({path: [values[index] for index in indices.tolist()] for (path, values), indices in axes})
 
     def chains(self) -> Iterator[Chain]:
         """Yield all points, in chains that can run side by side."""
@@ -177,7 +177,7 @@ class Grid:
 
 
 class PointList:
-    """Points in any places, to be run like those of a grid; `choices` are for what `base` leaves open."""
+    """Any points, to be run like those of a grid; `choices` are for open choices of `base`."""
 
     def __init__(self, base: Scene, points: Sequence[Mapping[str, Any]], choices: Choices = NOTHING) -> None:
         self.base, self.size, self._points = base, len(points), points
@@ -278,7 +278,7 @@ def _check_speeds(points: Points, axes: Mapping[str, Sequence[Any]]) -> None:
 def _telling(points: Points, axes: Mapping[str, Sequence[Any]]) -> list[Scene]:
     """Return scenes that decide whether all points are scenes. Raises InputError for a point that is none.
 
-    The frequency, and what has a column (engine.columns), has bounds that are linear in all such numbers: where
+    The frequency, and numbers with a column (engine.columns), have bounds that are linear in all such numbers: where
     the corners of the grid are scenes, so is what lies between.
     """
     known = {path for path in columned(points.base, axes) if _ordered(axes[path])}
@@ -289,9 +289,9 @@ def _telling(points: Points, axes: Mapping[str, Sequence[Any]]) -> list[Scene]:
         return [points.raw(dict(zip(axes, values, strict=True))) for values in itertools.product(*ends.values())]
     first = {path: values[0] for path, values in axes.items()}
     others = {path: values for path, values in axes.items() if path != FREQUENCY}
-    told = [dict(zip(others, values, strict=True)) for values in itertools.product(*others.values())]
-    told += [{FREQUENCY: frequency} for frequency in axes.get(FREQUENCY, ())]
-    return [points.raw(first | values) for values in told]
+    changes = [dict(zip(others, values, strict=True)) for values in itertools.product(*others.values())]
+    changes += [{FREQUENCY: frequency} for frequency in axes.get(FREQUENCY, ())]
+    return [points.raw(first | values) for values in changes]
 
 
 def _check_method(scene: Scene) -> None:
@@ -311,8 +311,10 @@ def _check_ring(scene: Scene, first: Scene, axes: Mapping[str, Sequence[Any]]) -
         raise InputError("sweep.structure.file: rings of different sectors or labels; sweep them one by one")
     changes = [path for path in axes if path.endswith(".sectors")]
     if changes and (scene.planar or "sections" in scene.kept):
-        what = "results of bodies in the plane" if scene.planar else "sections"
-        raise InputError(f"sweep.{changes[0]}: changes the number of bodies, and with it that of {what}; leave it out")
+        quantity = "results of bodies in the plane" if scene.planar else "sections"
+        raise InputError(
+            f"sweep.{changes[0]}: changes the number of bodies, and with it that of {quantity}; leave it out"
+        )
 
 
 def _along(scene: Scene, axes: Mapping[str, Sequence[Any]]) -> str:

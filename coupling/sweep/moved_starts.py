@@ -22,7 +22,7 @@ _SECTIONS = 33
 
 
 def with_moved_starts(grid: Grid, sweep: Sweep, executor: Executor | None) -> Sweep:
-    """Return a sweep that says what the peak of each curve is in a run from moved bodies (Sweep.moved_starts).
+    """Return a sweep with the peaks in runs from moved bodies (Sweep.moved_starts).
 
     Warnings name peaks with another mean, and neighbours that never part. Linked runs are left out, which begin with
     their neighbours' states, and curves of one point, as of maps at one frequency.
@@ -39,13 +39,13 @@ def with_moved_starts(grid: Grid, sweep: Sweep, executor: Executor | None) -> Sw
     again = [_begun(points[number], scenes[number].positions) for number in rows]
     base = replace(grid.base, sweep={"sections": _SECTIONS} if rows else {})
     table = _run(PointList(base, [*aside, *again], grid.choices), executor)
-    found, notes = _compared(sweep, peaks, points, table)
+    compared, notes = _compared(sweep, peaks, points, table)
     sections = {name: values[len(peaks) :] for name, values in table.arrays((len(table.done),)).items()}
-    for place, number in enumerate(rows):
-        motion = (sections[name][place] for name in ("section_slip", "section_slip_velocity"))
+    for rank, number in enumerate(rows):
+        motion = (sections[name][rank] for name in ("section_slip", "section_slip_velocity"))
         notes += [f"at {_named(points[number])}: {note}" for note in as_one(unrolled(scenes[number]), *motion)]
     warnings = [*sweep.warnings, *_first(notes)]
-    more = {"moved_starts": found} | ({"warnings": warnings} if warnings else {})
+    more = {"moved_starts": compared} | ({"warnings": warnings} if warnings else {})
     return replace(sweep, provenance={**sweep.provenance, **more})
 
 
@@ -56,14 +56,14 @@ def _peaks(sweep: Sweep) -> Iterator[int]:
     axis = list(sweep.axes).index(sweep.along)
     mean = np.moveaxis(mean, axis, -1)
     numbers = np.moveaxis(np.arange(sweep.status.size).reshape(sweep.shape), axis, -1)
-    for place in np.ndindex(mean.shape[:-1]):
-        peak = int(np.argmax(mean[place]))
-        if mean[place][peak] >= 0.0:
-            yield int(numbers[place][peak])
+    for curve in np.ndindex(mean.shape[:-1]):
+        peak = int(np.argmax(mean[curve]))
+        if mean[curve][peak] >= 0.0:
+            yield int(numbers[curve][peak])
 
 
 def _begun(point: Mapping[str, Any], positions: Sequence[float]) -> dict[str, Any]:
-    return {**point} | {f"damper.{number}.position": place for number, place in enumerate(positions)}
+    return {**point} | {f"damper.{number}.position": position for number, position in enumerate(positions)}
 
 
 def _run(points: PointList, executor: Executor | None) -> SweepTable:
@@ -77,14 +77,14 @@ def _compared(
     sweep: Sweep, peaks: Sequence[int], points: Sequence[Mapping[str, Any]], table: SweepTable
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Return the results of the second runs, and warnings of those that do not agree with the first."""
-    found, notes, status = [], [], table.text("status")
+    entries, notes, status = [], [], table.text("status")
     for number, (peak, point) in enumerate(zip(peaks, points, strict=True)):
-        kept = {name: float(table.row.value(table.values[number], name)) for name in KEPT}
+        means = {name: float(table.row.value(table.values[number], name)) for name in KEPT}
         one = Mean.of("ok", {name: float(getattr(sweep, name).flat[peak]) for name in KEPT})
-        results, warnings = one.compared(Mean.of(str(status[number]), kept), sweep.scene.time.tolerance)
-        found.append({"at": dict(point)} | results | kept)
+        results, warnings = one.compared(Mean.of(str(status[number]), means), sweep.scene.time.tolerance)
+        entries.append({"at": dict(point)} | results | means)
         notes += [f"at {_named(point)}: {warning}" for warning in warnings]
-    return found, notes
+    return entries, notes
 
 
 def _named(point: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.coupling.quantities import linear_peaks
 from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_mean
 from vanedamp.coupling.quantities.energy import penetration
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, declared_in, labels, labels_along, table
+from vanedamp.coupling.quantities.quantity import Quantity, QuantityRecord, declared_in, labels, labels_along, table
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.scene.rotation import FREQUENCY, SPEEDS
 from vanedamp.coupling.scene.units import unit_of
@@ -44,7 +44,7 @@ _MOST_ROWS = 20
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweep(Measured, OverAxes):
+class Sweep(QuantityRecord, OverAxes):
     """Responses over the product of the axes.
 
     All quantities that points have are attributes (results.md), arrays over the grid in the axes' order, with
@@ -90,7 +90,7 @@ class Sweep(Measured, OverAxes):
 
     @property
     def hot_spots(self) -> dict[str, dict[str, Any]]:
-        """What is known of the hot spots of `stress`, by name in their order (rom.recovery.hot_spots)."""
+        """Data of the hot spots of `stress`, by name in their order (rom.recovery.hot_spots)."""
         return dict(self.provenance.get("hot_spots", {}))
 
     def _repr_html_(self) -> str:
@@ -115,8 +115,8 @@ class Sweep(Measured, OverAxes):
     def derived(self) -> dict[str, Any]:
         """Return units by path and name, and what the user is to know."""
         notes: dict[str, Any] = {"warnings": list(self.warnings)}
-        kept = ("estimate", "advice", "moved_starts")
-        notes |= {name: self.provenance[name] for name in kept if self.provenance.get(name)}
+        names = ("estimate", "advice", "moved_starts")
+        notes |= {name: self.provenance[name] for name in names if self.provenance.get(name)}
         units = {name: table()[name].unit for name in (*self.quantities, *self.peaks)}
         return {"units": self.units() | units, "loss": list(labels("loss"))} | notes
 

@@ -1,4 +1,4 @@
-"""What a sweep keeps of a point: which quantities its runs have, and where they stand in a row of numbers."""
+"""A sweep's data of a point: which quantities its runs have, and their columns in a row of numbers."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file, ring_
 from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.files.store import read_only
 
-#: what sweeps do not have, and why
+#: quantities that sweeps lack, and why
 NOT_IN_SWEEPS: dict[str, str] = {}
 #: texts of every point
 TEXTS = ("status", "classification")
 _SECTION = "section"
-#: what observers of runs in compiled code keep (simulation.parts_of_run)
+#: kept by observers of runs in compiled code (simulation.parts_of_run)
 PARTS = ("wear", "sectors", "contacts", "stress")
 
 
@@ -71,7 +71,7 @@ class Row:
         return not all(one.exists(OF_MOTION + OF_PLANE) for one in self.quantities.values())
 
     def put(self, row: np.ndarray, response: Response, more: Mapping[str, Any]) -> tuple[str, ...]:
-        """Put the quantities of a run into a row (width,); return its texts. more: what runs have no part for."""
+        """Put the quantities of a run into a row (width,); return its texts. more: data that runs lack."""
         for name in self.quantities:
             if (value := getattr(response, name)) is not None:
                 self._set(row[None], name, np.asarray(value, float)[None])
@@ -89,19 +89,19 @@ class Row:
         return (one for one in possible(frozenset(sources)) if one.name in self.quantities)
 
     def _set(self, rows: np.ndarray, name: str, values: np.ndarray) -> None:
-        """Put a quantity of k runs (k, ...) into rows (k, width); of sections the last, the first places stay free."""
-        place, own = self.places[name], self.quantities[name]
-        if own.dims[:1] == (_SECTION,):
+        """Put a quantity of k runs (k, ...) into rows (k, width); of sections the last; the first entries stay free."""
+        columns, quantity = self.places[name], self.quantities[name]
+        if quantity.dims[:1] == (_SECTION,):
             count, each = values.shape[1], math.prod(values.shape[2:])
             values = values[:, max(count - self._sizes[_SECTION], 0) :]
-            place = slice(place.stop - values.shape[1] * each, place.stop)
-        rows[:, place] = values.reshape(len(rows), -1)
+            columns = slice(columns.stop - values.shape[1] * each, columns.stop)
+        rows[:, columns] = values.reshape(len(rows), -1)
 
     def put_many(self, rows: np.ndarray, sources: Mapping[str, Any]) -> None:
-        """Put the quantities of k runs into rows (k, width), by what they need, (k, ...) each."""
+        """Put the quantities of k runs into rows (k, width), by their inputs, (k, ...) each."""
         with np.errstate(all="ignore"):
             for one in self._had_by(sources):
-                if one.dims == ("damper",):  # of bodies in the plane, by the formula for one run
+                if one.dims == ("damper",):  # of planar bodies, by the formula for one run
                     each = (one.of({name: sources[name][k] for name in one.needs}) for k in range(len(rows)))
                     self._set(rows, one.name, np.array(list(each)))
                 else:
@@ -111,8 +111,8 @@ class Row:
         """Return a quantity of rows (..., width); nan where points have none."""
         if name not in self.places:
             return np.full(rows.shape[:-1], np.nan)
-        found: np.ndarray = rows[..., self.places[name]]
-        return found.reshape((*rows.shape[:-1], *self.shape(self.quantities[name])))
+        values: np.ndarray = rows[..., self.places[name]]
+        return values.reshape((*rows.shape[:-1], *self.shape(self.quantities[name])))
 
     def arrays(self, rows: np.ndarray, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
         """Return all quantities of rows (points, width) as arrays over a grid, and behind it their own dimensions."""

@@ -1,7 +1,7 @@
-"""Runs of one scene with other numbers, one after the other: in compiled code where the numbers have columns.
+"""Runs of one scene with other numbers, in turn: in compiled code where the numbers have columns.
 
 A search runs a scene some thousand times. A run of a few hundred periods that Python makes, assembles and evaluates
-takes several times as long as its motion.
+takes several times while its motion.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ import numpy as np
 
 from vanedamp.coupling.engine.columns import columned
 from vanedamp.coupling.numerics.codes import DONE, NOT_STEADY, UNCERTAIN
-from vanedamp.coupling.quantities.quantity import Measured, evaluated
+from vanedamp.coupling.quantities.quantity import QuantityRecord, evaluated
 from vanedamp.coupling.response.evaluation import known_value
 from vanedamp.coupling.response.response import Response, Status
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.alike import Common, Kind, keys, kind_of, without_starts
+from vanedamp.coupling.sweep.alike import Common, SceneBatch, keys, kind_of, without_starts
 from vanedamp.coupling.sweep.grid import Points, PointTable
 from vanedamp.coupling.sweep.row import Row
 from vanedamp.files.toml_input import InputError
@@ -32,8 +32,8 @@ _WHOLE = (DONE, NOT_STEADY, UNCERTAIN)
 
 
 @dataclass(frozen=True, eq=False)
-class Ran(Measured):
-    """What a run has: as a Response, from which it has only these."""
+class Ran(QuantityRecord):
+    """Data of a run, as a Response, from which it has only these."""
 
     status: Status
     classification: str
@@ -70,39 +70,39 @@ class Runs:
         self, points: Sequence[Mapping[str, float]], starts: Sequence[RestartState | None]
     ) -> list[Ran | Response | None]:
         """Return the runs with numbers, each as `run`: those that differ only in columns in one compiled call."""
-        found: list[Ran | Response | None] = [None] * len(points)
+        records: list[Ran | Response | None] = [None] * len(points)
         waiting, groups = dict.fromkeys(range(len(points))), dict[Any, list[int]]()
         if self._paths and self._whole:
-            for place, key in enumerate(keys(PointTable.of(points), self._paths)):
-                groups.setdefault((starts[place] is None, *key), []).append(place)
+            for index, key in enumerate(keys(PointTable.of(points), self._paths)):
+                groups.setdefault((starts[index] is None, *key), []).append(index)
         for places in groups.values():
             kind = kind_of(self._maker, points[places[0]], self._paths, self._common)
             with suppress(InputError):  # a start that does not fit: its own run says so
                 if kind is not None:
-                    own = self._ran(kind, [points[place] for place in places], [starts[place] for place in places])
-                    for place, ran in zip(places, own, strict=True):
+                    batch = self._ran(kind, [points[index] for index in places], [starts[index] for index in places])
+                    for index, ran in zip(places, batch, strict=True):
                         if ran is not None:
-                            found[place] = ran
-                            del waiting[place]
-        for place in waiting:
-            scene = self.scene(points[place])
-            found[place] = None if scene is None else simulate(scene, start=starts[place])
-        return found
+                            records[index] = ran
+                            del waiting[index]
+        for index in waiting:
+            scene = self.scene(points[index])
+            records[index] = None if scene is None else simulate(scene, start=starts[index])
+        return records
 
     def _ran(
-        self, kind: Kind, points: Sequence[Mapping[str, float]], starts: Sequence[RestartState | None]
+        self, kind: SceneBatch, points: Sequence[Mapping[str, float]], starts: Sequence[RestartState | None]
     ) -> list[Ran | None]:
         """Return the runs of scenes of a kind, all with starts or all without; None for those that it refuses."""
         values = {path: np.array([numbers[path] for numbers in points]) for path in self._paths}
         given = [start for start in starts if start is not None]
         job, linear, _ = kind.run_all(values, given or None, False, lambda *_: None)
-        found = list[Ran | None]()
+        records = list[Ran | None]()
         for k in range(len(points)):
             if not job.codes[k]:
-                found.append(None)
+                records.append(None)
                 continue
             final = kind.left(k) if job.codes[k] in _WHOLE else None
             status, classification = kind.ended(job, k)
             quantities = evaluated(kind.sources(job, linear, k), partial(known_value, status))
-            found.append(Ran(status, classification, quantities, final))
-        return found
+            records.append(Ran(status, classification, quantities, final))
+        return records

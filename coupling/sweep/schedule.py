@@ -12,15 +12,7 @@ import numpy as np
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.grid import PointSet
 from vanedamp.coupling.sweep.row import Row
-from vanedamp.coupling.sweep.worker import (
-    SweepError,
-    SweepTable,
-    Task,
-    TaskResult,
-    broken,
-    run_points,
-    tasks_of,
-)
+from vanedamp.coupling.sweep.worker import SweepError, SweepTable, Task, TaskResult, broken, run_points, tasks_of
 
 #: s that a task takes at least, unless few points are left: long enough that handing it out costs nothing
 _SECONDS = 1.0
@@ -31,7 +23,7 @@ _RATE = 100
 _PER_WORKER = 4
 #: points of a task at most: their values and results wait in the main process
 _MOST = 10_000
-#: workers of an executor that does not tell how many it has
+#: workers of an executor of an unknown number
 _UNKNOWN = 256
 
 #: a task and the rest of its chain

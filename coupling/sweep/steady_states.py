@@ -1,4 +1,4 @@
-"""Steady states of a sweep: which of its runs differ only in how they begin, and in which motion each of them ends."""
+"""Steady states of a sweep: which of its runs differ only in how they begin, and in which motion each ends."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vanedamp.files.store import frozen
 _BODY = ("position", "velocity", "lift", "lift_velocity", "tilt", "tilt_rate")
 #: tables that say how a run begins
 _TABLES = ("initial", "continuation")
-#: measures that tell steady states apart, and the size below which their differences count as absolute ones
+#: measures that distinguish steady states, and the size below which their differences count as absolute ones
 _FINGERPRINT = {amplitude_mean_dynamic.name: 0.0, attached_mass_fraction.name: 1.0, impacts_per_period.name: 1.0}
 
 
@@ -61,7 +61,7 @@ class SteadyStates:
 
 
 def is_start(path: str) -> bool:
-    """Say whether a key of a scene changes how a run begins, and neither the system nor what excites it."""
+    """Say whether a key of a scene changes only how a run begins, neither system nor excitation."""
     steps = path.split(".")
     return steps[0] in _TABLES or (steps[0] == "damper" and steps[-1] in _BODY)
 
@@ -83,23 +83,23 @@ def steady_states(sweep: Sweep, tolerance: float = 0.01) -> SteadyStates:
     label = np.full(sweep.status.size, -1)
     states = np.empty(len(points), object)
     ok = sweep.status.ravel() == "ok"
-    for number, place in enumerate(points):
-        place = place[ok[place]]
-        label[place], states[number] = _states(sweep, place, tolerance)
+    for number, indices in enumerate(points):
+        indices = indices[ok[indices]]
+        label[indices], states[number] = _states(sweep, indices, tolerance)
     return SteadyStates(
         tuple(starts), tuple(parameters), frozen(label.reshape(sweep.shape), int),
         states.reshape(shape[: len(parameters)]),
     )  # fmt: skip
 
 
-def _states(sweep: Sweep, place: np.ndarray, tolerance: float) -> tuple[np.ndarray, list[SteadyState]]:
-    """Return labels (n,) and states of the runs at some places of the grid, which differ only in their start."""
-    if not len(place):
+def _states(sweep: Sweep, indices: np.ndarray, tolerance: float) -> tuple[np.ndarray, list[SteadyState]]:
+    """Return labels (n,) and states of the runs at some points of the grid, which differ only in their start."""
+    if not len(indices):
         return np.zeros(0, int), []
-    classification = sweep.classification.ravel()[place]
-    measures = {name: np.nan_to_num(getattr(sweep, name).ravel()[place]) for name in _FINGERPRINT}
+    classification = sweep.classification.ravel()[indices]
+    measures = {name: np.nan_to_num(getattr(sweep, name).ravel()[indices]) for name in _FINGERPRINT}
     amplitude = measures[amplitude_mean_dynamic.name]
-    confidence = np.nan_to_num(sweep.amplitude_mean_confidence.ravel()[place])
+    confidence = np.nan_to_num(sweep.amplitude_mean_confidence.ravel()[indices])
     relative = np.divide(confidence, amplitude, out=np.zeros_like(amplitude), where=amplitude > 0)
     half = np.maximum(tolerance / 2, np.where(classification == "non-periodic", relative, 0.0))
     widths = [half * np.maximum(np.abs(values), _FINGERPRINT[name]) for name, values in measures.items()]
@@ -108,15 +108,15 @@ def _states(sweep: Sweep, place: np.ndarray, tolerance: float) -> tuple[np.ndarr
         for values, width in zip(measures.values(), widths, strict=True):
             group = _split(group, values, width)
     by_amplitude = np.argsort([amplitude[group == number].mean() for number in range(count)], kind="stable")
-    label, found = np.argsort(by_amplitude)[group], []
+    label, states = np.argsort(by_amplitude)[group], []
     for number in range(count):
-        own = label == number
+        members = label == number
         means = {
-            name: float(np.nan_to_num(getattr(sweep, name).ravel()[place][own]).mean())
+            name: float(np.nan_to_num(getattr(sweep, name).ravel()[indices][members]).mean())
             for name in (amplitude_mean.name, attached_mass_fraction.name, impacts_per_period.name)
         }
-        found.append(SteadyState(classification[own][0], **means, runs=int(own.sum())))
-    return label, found
+        states.append(SteadyState(classification[members][0], **means, runs=int(members.sum())))
+    return label, states
 
 
 def _split(group: np.ndarray, values: np.ndarray, half: np.ndarray) -> np.ndarray:

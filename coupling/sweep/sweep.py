@@ -20,7 +20,7 @@ from vanedamp.coupling.quantities.quantity import evaluated
 from vanedamp.coupling.scene.rotation import SPEEDS
 from vanedamp.coupling.scene.scene import Scene, Time, loaded
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.checkpoint import Checkpoint
+from vanedamp.coupling.sweep.checkpoint import SweepCheckpoint
 from vanedamp.coupling.sweep.grid import Grid, PointList, Points, PointSet, resonance_axis
 from vanedamp.coupling.sweep.grid import grid as grid_of
 from vanedamp.coupling.sweep.moved_starts import with_moved_starts
@@ -59,8 +59,8 @@ def sweep(
     """
     grid = scene if isinstance(scene, Grid) else grid_of(loaded(scene))
     provenance = dict(provenance or {})
-    found = result_of(grid, run_all(grid.scene, grid, executor, progress, checkpoint, provenance), provenance)
-    return with_moved_starts(grid, found, executor) if moved_starts else found
+    result = result_of(grid, run_all(grid.scene, grid, executor, progress, checkpoint, provenance), provenance)
+    return with_moved_starts(grid, result, executor) if moved_starts else result
 
 
 def run_all(
@@ -72,12 +72,12 @@ def run_all(
     provenance: Mapping[str, Any],
 ) -> SweepTable:
     """Run all points of a scene with a [sweep] table, or with ranges; other arguments as of `sweep`."""
-    with Checkpoint(checkpoint, scene, points.size, provenance) as kept:
-        finished = kept.finished
+    with SweepCheckpoint(checkpoint, scene, points.size, provenance) as saved:
+        finished = saved.finished
         if progress is not None:
             progress(finished.count, points.size)
         for task, rest, result in run_tasks(points, finished, executor):
-            kept.add(task, result, bool(rest))
+            saved.add(task, result, bool(rest))
             if progress is not None:
                 progress(finished.count, points.size)
     return finished
@@ -105,21 +105,21 @@ def run_list(
 
 def result_of(grid: Grid, finished: SweepTable, provenance: dict[str, Any]) -> Sweep:
     """Return the record of a grid whose points are all finished."""
-    found = finished.arrays(grid.shape)
+    quantities = finished.arrays(grid.shape)
     return Sweep(
         scene=grid.scene,
         axes=of_axes(grid.axes),
-        quantities=found,
+        quantities=quantities,
         **{name: frozen(finished.text(name).reshape(grid.shape), object) for name in TEXTS},
         peaks=linear_tops(grid),
         provenance=provenance
         | ({"hot_spots": spots} if (spots := hot_spots_in_file(grid.base.structure)) else {})
-        | notes_on(grid, found),
+        | notes_on(grid, quantities),
     )
 
 
 def notes_on(grid: Grid, quantities: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Return what a record's provenance says of a grid: warnings, estimate and advice. quantities: of all points."""
+    """Return a grid's part of a record's provenance: warnings, estimate and advice. quantities: of all points."""
     warnings = [*grid.warnings, *wall_warnings(grid.base, grid.axes, quantities[penetration.name])]
     notes = {"warnings": warnings, "estimate": grid.estimate, "advice": grid.advice}
     return {name: note for name, note in notes.items() if note}
@@ -138,13 +138,13 @@ def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
         return {}
     others = {path: values for path, values in grid.axes.items() if path != swept}
     low, high = min(grid.axes[swept]), max(grid.axes[swept])
-    points, found, known = Points(grid.base, grid.choices), [], dict[tuple[Any, ...], dict[str, float]]()
+    points, peaks, known = Points(grid.base, grid.choices), [], dict[tuple[Any, ...], dict[str, float]]()
     feels = [path for path in others if not UNFELT.fullmatch(path)]
     fits = set(foreseen(grid.base, others)) | set(feels) == set(others)  # others may keep bodies from fitting together
     for values in itertools.product(*others.values()):
         felt = tuple(value for path, value in zip(others, values, strict=True) if path in feels)
         if felt in known and fits:
-            found.append(known[felt])
+            peaks.append(known[felt])
             continue
         try:
             scene = points.scene({**dict(zip(others, values, strict=True)), swept: low})
@@ -152,11 +152,11 @@ def linear_tops(grid: Grid) -> dict[str, np.ndarray]:
                 assemble(scene)  # raises where bodies do not fit together
             else:
                 known[felt] = tops(*linear_peaks(scene, *(end * SPEEDS.get(swept, 1.0) for end in (low, high))))
-            found.append(known[felt])
+            peaks.append(known[felt])
         except InputError:  # the points' status, or a waveform
-            found.append(dict.fromkeys(PEAKS, np.nan))
+            peaks.append(dict.fromkeys(PEAKS, np.nan))
     shape = tuple(len(values) for values in others.values())
-    return {name: frozen(np.reshape([item[name] for item in found], shape)) for name in PEAKS}
+    return {name: frozen(np.reshape([item[name] for item in peaks], shape)) for name in PEAKS}
 
 
 def tops(undamped: LinearPeak, fixed: LinearPeak) -> dict[str, float]:

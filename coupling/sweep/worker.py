@@ -35,7 +35,7 @@ class SweepError(VanedampError):
 
 
 class Task(NamedTuple):
-    """Points that one worker runs one after the other; linked ones begin with `start` (None: as the scene says)."""
+    """Points that one worker runs in turn; linked ones begin with `start` (None: as the scene says)."""
 
     points: Sequence[int]
     linked: bool = False
@@ -69,42 +69,42 @@ def run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], t
 def _run_points(base: Scene, choices: Any, points: Sequence[Mapping[str, Any]], task: Task) -> TaskResult:
     started = time.perf_counter()
     points, maker, state = PointTable.of(points), Points(base, choices), task.start if task.linked else None
-    own = Row(base)
-    values, texts = np.full((len(points), own.width), np.nan), [("",) * len(own.texts)] * len(points)
+    row = Row(base)
+    values, texts = np.full((len(points), row.width), np.nan), [("",) * len(row.texts)] * len(points)
     for paths, places in groups(base, points, task.linked):
 
-        def alone(place: int, start: RestartState | None, places: Sequence[int] = places) -> RestartState | None:
-            place = places[place]
-            final, texts[place] = _run(maker, points[place], start, values[place], own)
+        def alone(index: int, start: RestartState | None, places: Sequence[int] = places) -> RestartState | None:
+            index = places[index]
+            final, texts[index] = _run(maker, points[index], start, values[index], row)
             return final
 
-        def keep(place: int, parts: Mapping[str, Any], places: Sequence[int] = places) -> None:
-            own.put_parts(values[places[place]], parts)
+        def keep(index: int, parts: Mapping[str, Any], places: Sequence[int] = places) -> None:
+            row.put_parts(values[places[index]], parts)
 
         numbers = {path: np.array(points.columns[path], float)[places] for path in paths}
         first = points[places[0]]
         kind = kind_of(maker, first, paths) if paths and are_scenes(maker, first, numbers) else None
-        found = None
+        outcome = None
         if kind is not None:
             with suppress(InputError):  # a start that does not fit: the runs say so
-                found = kind.run_all(numbers, state, task.linked, alone, keep if own.keeps else None)
-        if kind is None or found is None:
-            for place in range(len(places)):
-                final = alone(place, state)
+                outcome = kind.run_all(numbers, state, task.linked, alone, keep if row.keeps else None)
+        if kind is None or outcome is None:
+            for index in range(len(places)):
+                final = alone(index, state)
                 # a run that broke off within a period leaves the state that it began with
                 state = final if task.linked and final is not None else state
             continue
-        job, linear, state = found
+        job, linear, state = outcome
         ran = np.flatnonzero(job.codes)
         if not len(ran):
             continue
         at = np.array(places)[ran]
         rows = values[at]
-        own.put_many(rows, kind.sources(job, linear, ran))
+        row.put_many(rows, kind.sources(job, linear, ran))
         values[at] = rows
-        for place, k in zip(at, ran, strict=True):
+        for index, k in zip(at, ran, strict=True):
             status, motion = kind.ended(job, k)
-            texts[place] = status.value, motion
+            texts[index] = status.value, motion
     return TaskResult(values, texts, state, time.perf_counter() - started)
 
 
@@ -120,7 +120,7 @@ def broken(error: BaseException, row: Row, points: int = 1) -> TaskResult:
 class SweepTable:
     """The finished points of a grid: some 180 bytes each.
 
-    row: what each has; values: (points, width); codes: (points, t) places of the texts in `texts`; done: (points,);
+    row: of each; values: (points, width); codes: (points, t) indices in `texts`; done: (points,);
     states: the state that the next run of an unfinished chain begins with.
     """
 
@@ -150,8 +150,8 @@ class SweepTable:
     def put(self, where: Any, values: np.ndarray, codes: np.ndarray, texts: Sequence[str] | None = None) -> None:
         """Set points, with codes that refer to `texts` (default: those of this record)."""
         if texts is not None:
-            own = np.array([self._places.setdefault(text, len(self._places)) for text in texts], np.int32)
-            codes = own[codes]
+            numbers = np.array([self._places.setdefault(text, len(self._places)) for text in texts], np.int32)
+            codes = numbers[codes]
         self.values[where], self.codes[where] = values, codes
         self.done[where] = True
         self.count = int(np.count_nonzero(self.done))

@@ -41,7 +41,7 @@ _MOMENT = 1e-6
 Loads = Callable[[np.ndarray], np.ndarray]
 
 
-class Motion(NamedTuple):
+class Coordinates(NamedTuple):
     """A motion at one time: coordinates (N,) and their rates."""
 
     q: np.ndarray
@@ -70,9 +70,9 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     placed = _places(scene, basis, bodies, surfaces, loads, size)
     mass, holds = _mass(bodies, size), _holding(scene, loads)
     law = Law(scene.contact, basis, mass)
-    contacts, own = _contacts(scene, law, bodies, surfaces, placed, excited["load"][:, :n])
+    contacts, elements = _contacts(scene, law, bodies, surfaces, placed, excited["load"][:, :n])
     rubbing = friction_elements(scene, bodies, placed["floor"], holds, casing["casing"], casing["grip"])
-    units = _columns([*contacts, *own, *rubbing], size)
+    units = _columns([*contacts, *elements, *rubbing], size)
     sliders = len(casing["tangential"])
     massive = slice(size - sliders)
     # rows of sliders are not to be small compared with others
@@ -122,8 +122,8 @@ def _by_sector(scene: Scene, basis: ModalBasis) -> np.ndarray:
     ring, name = ring_in_file(scene.structure), forced_label(scene).partition("@")[0]
     sectors = range(0 if ring is None else ring.sectors)
     rows = [interface_row(basis, f"{name}@{sector}", "excitation.at") for sector in sectors]
-    found: np.ndarray = array(rows).reshape(len(rows), len(basis.stiffness))
-    return found
+    matrix: np.ndarray = array(rows).reshape(len(rows), len(basis.stiffness))
+    return matrix
 
 
 def _excitation(
@@ -197,11 +197,11 @@ def _contacts(
     start = abs(begun.displacement) + (abs(begun.velocity) / np.sqrt(squares[0]) if len(squares) else 0.0)
     reach = np.abs(values(force)).sum(axis=0) / values(squares)
     parts = ElementParts(law, forced_label(scene), reach, start, placed["floor"], placed["along"])
-    own = list(element_units(scene, parts))
-    contacts += [unit for unit in own if unit.normal.any()]
+    elements = list(element_units(scene, parts))
+    contacts += [unit for unit in elements if unit.normal.any()]
     if active() is None:
         check_friction(contacts, law.mass)
-    return contacts, [unit for unit in own if not unit.normal.any()]
+    return contacts, [unit for unit in elements if not unit.normal.any()]
 
 
 def _columns(units: list[Unit], size: int) -> dict[str, Any]:
@@ -209,11 +209,11 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     # arrays of their own, as all in a system: the compiled functions are compiled for the layout of their arguments
     elements = [unit.element for unit in units]
     J = array([unit.normal for unit in units] + [unit.slip for unit in units]).reshape(2 * len(units), size)
-    found: dict[str, Any] = {
+    columns: dict[str, Any] = {
         name: np.array([getattr(unit, name) for unit in units], np.int64) for name in ("body", "other", "corner")
     }
-    found |= {name: array([getattr(unit, name) for unit in units]) for name in ("rest", "friction", "limit", "play")}
-    return found | {
+    columns |= {name: array([getattr(unit, name) for unit in units]) for name in ("rest", "friction", "limit", "play")}
+    return columns | {
         "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J,
         "restitution": array([element.restitution for element in elements]),
         "spring": array([element.stiffness for element in elements]),
@@ -230,10 +230,10 @@ def _stiffness(
     stiffness[:n, :n], damping[:n, :n] = np.diag(basis.stiffness), basis.damping
     for body, pull, drag in zip(bodies, *binding(scene, loads), strict=True):
         if pull or drag:
-            own = -floor[body.number]
-            own[body.x] = 1.0
-            stiffness += pull * np.outer(own, own)
-            damping += drag * np.outer(own, own)
+            shape = -floor[body.number]
+            shape[body.x] = 1.0
+            stiffness += pull * np.outer(shape, shape)
+            damping += drag * np.outer(shape, shape)
         stiffness[body.x, body.x] -= loads.gradient[body.number]
     return stiffness, damping
 
@@ -269,13 +269,13 @@ def pressing(scene: Scene, loads: BodyLoads | None = None) -> list[float]:
 
 def _holding(scene: Scene, loads: BodyLoads) -> np.ndarray:
     """Return the friction (b,) that holds each body on its floor under its weight, at most, N."""
-    found = []
+    forces = []
     for damper, force in zip(scene.damper, pressing(scene, loads), strict=True):
         friction = coefficient(damper.friction)
         # the equations know it of bodies that only slide: of others it need not turn
         force = values(force) if damper.form.extended else force
-        found.append(0.0 if vanishes(friction) else friction * max(force, 0.0))
-    return array(found)
+        forces.append(0.0 if vanishes(friction) else friction * max(force, 0.0))
+    return array(forces)
 
 
 def _bodies(scene: Scene, first: int) -> list[Body]:
@@ -289,7 +289,7 @@ def _bodies(scene: Scene, first: int) -> list[Body]:
 
 
 def _surfaces(scene: Scene, basis: ModalBasis, index: int, bodies: list[Body]) -> tuple[Surface, ...]:
-    """Return the surfaces of a cavity: with their motion across and their rotation where a body feels these."""
+    """Return the surfaces of a cavity: with their motion across and their rotation where a body needs these."""
     high = any(bodies[k].b > 0.0 for k in scene.bodies_in(scene.cavity[index]))
     return surfaces_of(scene, basis, index) if high or scene.planar else walls_and_floor(scene, basis, index)
 
@@ -307,7 +307,7 @@ def base_acceleration(scene: Scene, basis: ModalBasis) -> np.ndarray:
 
 
 def loads_of(scene: Scene, signal: Waveform) -> Loads:
-    """Return the loads of the scene's excitation with a signal in place of its sine."""
+    """Return the loads of the scene's excitation with a signal instead of its sine."""
     sine = replace(scene.excitation, waveform=None, frequency=scene.frequency, engine_order=None)
     level = -assemble(replace(scene, excitation=sine)).load[0].imag  # Re(load exp(i omega t)) = level sin(omega t)
     return lambda angle: np.outer(signal.sampled(angle), level)

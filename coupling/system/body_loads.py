@@ -1,4 +1,4 @@
-"""What gravity and rotation do to bodies: pull along their cavities, press on floors, and bring back on concave tracks.
+"""Gravity and rotation of bodies: they pull along their cavities, press on floors, and bring back on concave tracks.
 
 In a frame that turns at a constant speed W, a body of mass m whose centre is at X, from a point of the axis, feels the
 centrifugal load m W^2 P X, P the projector across the axis. With t the direction of its cavity and n the normal from
@@ -59,7 +59,7 @@ class _Field(NamedTuple):
 
 
 def body_loads(scene: Scene, basis: ModalBasis) -> BodyLoads:
-    """Return the loads of a scene's bodies. Raises InputError where the structure does not tell them."""
+    """Return the loads of a scene's bodies. Raises InputError where the structure lacks them."""
     loads = []
     for index, (damper, centre) in enumerate(zip(scene.damper, centres(scene), strict=True)):
         if scene.speed:
@@ -95,9 +95,9 @@ def centres(scene: Scene) -> np.ndarray:
     for cavity in scene.cavity:
         half = {number: scene.damper[number].half_extent[0] for number in scene.bodies_in(cavity)}
         end = -sum(half.values())
-        for number, own in half.items():
-            places[number] = end + own
-            end = places[number] + own
+        for number, extent in half.items():
+            places[number] = end + extent
+            end = places[number] + extent
     return places
 
 
@@ -110,7 +110,7 @@ def greatest_pull(scene: Scene) -> float:
 
 
 def load_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return the warnings of a scene on what the loads of its bodies neglect, of each kind the first."""
+    """Return the warnings of a scene on neglected loads of its bodies, of each kind the first."""
     if not scene.speed and all(damper.track_radius is None for damper in scene.damper):
         return ()
     try:
@@ -118,15 +118,15 @@ def load_warnings(scene: Scene) -> tuple[str, ...]:
         loads = body_loads(scene, basis)
     except InputError:  # which the run reports
         return ()
-    found: dict[str, str] = {}
+    by_kind: dict[str, str] = {}
     for index, damper in enumerate(scene.damper):
         body = _Body(scene, damper, float(loads.along[index]), float(loads.across[index]))
         for kind, sentence in itertools.chain(
             _of_rotation(body, _field(scene, basis, index), _standing_gravity(scene, basis)) if scene.speed else (),
             _of_track(body, damper.track_radius) if damper.track_radius is not None else (),
         ):
-            found.setdefault(kind, f"damper[{index}]: {sentence}")
-    return tuple(found.values())
+            by_kind.setdefault(kind, f"damper[{index}]: {sentence}")
+    return tuple(by_kind.values())
 
 
 class _Body(NamedTuple):
@@ -255,15 +255,15 @@ def _field(scene: Scene, basis: ModalBasis, index: int) -> _Field:
                 f"cavity[{scene.cavity_of(damper)}].floor: the reduced model knows no {name} of '{label}', which "
                 "[rotation] needs for the bodies on it; give it and reduce or import again"
             )
-    place = basis.positions[label] - point
+    arm = basis.positions[label] - point
     walls = [str(wall) for wall in cavity.labels()[:2]]
-    own = cavity.floor is None or label not in walls  # else a wall is the floor, at the cavity's position
-    if own and all(wall in basis.positions for wall in walls):
+    inside = cavity.floor is None or label not in walls  # else a wall is the floor, at the cavity's position
+    if inside and all(wall in basis.positions for wall in walls):
         middle = 0.5 * (basis.positions[walls[0]] + basis.positions[walls[1]]) - point
-        place = place + along * ((middle - place) @ along)
+        arm = arm + along * ((middle - arm) @ along)
     if across is not None:
-        place = place + across * damper.half_extent[1]
-    load = square * (place - axis * (place @ axis))
+        arm = arm + across * damper.half_extent[1]
+    load = square * (arm - axis * (arm @ axis))
     gradient = square * (1.0 - (along @ axis) ** 2)
     return _Field(load + _standing_gravity(scene, basis), gradient, along, across)
 
@@ -274,5 +274,5 @@ def _standing_gravity(scene: Scene, basis: ModalBasis) -> np.ndarray:
         return np.zeros(3)
     down = np.array(scene.gravity.direction)
     share = scene.gravity.acceleration * (float(down @ basis.rotation_axis) / float(np.linalg.norm(down)))
-    part: np.ndarray = share * basis.rotation_axis
-    return part
+    load: np.ndarray = share * basis.rotation_axis
+    return load

@@ -55,7 +55,7 @@ def check_directions(scene: Scene, basis: ModalBasis) -> None:
 
 
 def _check_known(scene: Scene, directions: Vectors) -> None:
-    """Raise InputError where base acceleration or gravity need a direction that the reduced model does not know."""
+    """Raise InputError where base acceleration or gravity need a direction that the reduced model lacks."""
     excitation, gravity = scene.excitation, scene.gravity
     reasons = ["excitation.base_acceleration"] if excitation.base_acceleration else []
     wanted = [("excitation.at", str(excitation.at))] if reasons and excitation.base_direction is None else []
@@ -81,7 +81,7 @@ def _check_displacements(scene: Scene, rotations: frozenset[str]) -> None:
         keys |= {f"cavity[{index}].{side}": getattr(cavity, side) for side in ("left", "right", "floor", "ceiling")}
     for table, number, element in scene.elements:
         keys |= {f"{table}[{number}].{key}": label for key, label in element.labels().items()}
-    keys |= {place: load.at for place, load in scene.excitation.loads.items()}
+    keys |= {name: load.at for name, load in scene.excitation.loads.items()}
     keys |= {f"friction_damper[{index}].at": damper.at for index, damper in enumerate(scene.friction_damper)}
     for key, label in keys.items():
         if label in rotations:
@@ -139,13 +139,13 @@ def _check_across(cavity: Cavity, key: str, directions: Vectors, normals: Vector
     across = directions.get(floor + NORMAL, np.zeros(3))
     labels = {"left": left, "right": right, "ceiling": cavity.ceiling or floor}
     for side, label in labels.items():
-        own = directions.get(label + NORMAL, np.zeros(3))
-        angle = _angle(own, across)
+        normal = directions.get(label + NORMAL, np.zeros(3))
+        angle = _angle(normal, across)
         if angle > _PARALLEL:
             raise InputError(
-                f"{key}.{side}: across the cavity '{label}' points at {angle:.0f} degrees to '{floor}', {_format(own)} "
-                f"and {_format(across)}: all surfaces take the one `normal` out of the floor; mend the interface's and "
-                "reduce again"
+                f"{key}.{side}: across the cavity '{label}' points at {angle:.0f} degrees to '{floor}', "
+                f"{_format(normal)} and {_format(across)}: all surfaces take the one `normal` out of the floor; "
+                "mend the interface's and reduce again"
             )
     for side, surface, sign in (("floor", floor, 1.0), ("ceiling", cavity.ceiling or floor, -1.0)):
         if side == "ceiling" and surface == floor:

@@ -26,12 +26,12 @@ def crossings(
 
     speeds = np.linspace(low, high, even)
     above = np.array([natural(float(speed)) - line(float(speed)) for speed in speeds])
-    found = []
-    for place, mode in np.argwhere((above[:-1] > 0.0) != (above[1:] > 0.0)):
+    roots = []
+    for index, mode in np.argwhere((above[:-1] > 0.0) != (above[1:] > 0.0)):
 
         def distance(speed: float, mode: int = int(mode)) -> float:
             return float(natural(speed)[mode]) - line(speed)
 
-        left, right = speeds[place : place + 2]
-        found.append(float(brentq(distance, left, right, xtol=_ACCURACY * high)))
-    return sorted(found)
+        left, right = speeds[index : index + 2]
+        roots.append(float(brentq(distance, left, right, xtol=_ACCURACY * high)))
+    return sorted(roots)

@@ -1,4 +1,4 @@
-"""The motion of a system while its units keep their states: the one place that solves for accelerations.
+"""The motion of a system while its units keep their states: nothing else solves for accelerations.
 
 In coordinates s = sqrt(M) q, where the mass matrix is one,
 
@@ -7,7 +7,7 @@ In coordinates s = sqrt(M) q, where the mass matrix is one,
 with R the rows that are kept at rest (gaps of closed contacts, slips that stick) and W the directions of their forces:
 a contact that slips has its friction in the direction of its normal force, W_N - sigma mu W_T, so that P is oblique.
 Closed compliant contacts and the springs of Jenkins elements whose sliders rest are parts of K and C. A slider has no
-mass: it rests, or follows what draws it.
+mass: it rests, or follows its driver.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class StateFlow:
     """A system with units in their states (u,), in coordinates sqrt(M) q.
 
     root: (N,) root of the masses; rows: (2u, N) J; drawn: (2u, N) motions by forces of rows: a slider that moves hands
-    its force on to what draws it. rubs: (u,) whether units have friction; way: (u,) direction in which they slip, or 0;
+    its force on to its driver. rubs: (u,) whether units have friction; way: (u,) direction in which they slip, or 0;
     drag: (u,) friction per normal force.
     closed, pressed: rigid and compliant contacts with forces; touching: rigid ones that are closed; stick: units whose
     slips are kept at rest; slides: friction elements that slip, with the forces `known`; holds, follows: Jenkins
@@ -72,7 +72,7 @@ class StateFlow:
     load: (e, N). oblique: (N, N) accelerations by loads; carried: (k, N) forces of the kept rows by loads, the least
     where these depend on each other; left: largest acceleration of a kept row per unit of load and length: forces that
     have no solution leave more than round-off.
-    squared: what may be left before forces are computed without the square of the rows' condition number.
+    squared: allowed remainder before forces are computed without the square of the rows' condition number.
     """
 
     def __init__(self, system: System, state: np.ndarray, squared: float = _SQUARED) -> None:
@@ -93,10 +93,10 @@ class StateFlow:
         self.wrench = wrenches(rows, self.closed, self.drag[self.closed], self.stick)
         self.push = wrenches(rows, self.pressed, self.drag[self.pressed], self.stick[:0])
         self.spring, self.dashpot = (
-            part[self.pressed, None] * rows[self.pressed] for part in (system.spring, system.dashpot)
+            matrix[self.pressed, None] * rows[self.pressed] for matrix in (system.spring, system.dashpot)
         )
         self.preload = system.spring[self.pressed] * system.rest[self.pressed]
-        stiffness, damping = (part / root / root[:, None] for part in (system.stiffness, system.damping))
+        stiffness, damping = (matrix / root / root[:, None] for matrix in (system.stiffness, system.damping))
         self.stiffness, self.damping = stiffness + self.push @ self.spring, damping + self.push @ self.dashpot
         if len(self.holds):
             stretch = system.elongation[self.holds] / root
@@ -117,7 +117,7 @@ class StateFlow:
 
     @cached_property
     def undetermined(self) -> np.ndarray:
-        """Forces (k, n) that the kept rows do not feel: laws leave them open. Normal in units of the rows' lengths."""
+        """Forces (k, n) in the kept rows' null space, which laws leave free. Normal in units of the rows' lengths."""
         rows = self.rows[self.kept]
         scale = 1 / np.linalg.norm(rows, axis=1)
         # on the rows' span: the mobility of rows that nearly depend on each other has the square of their condition
@@ -131,17 +131,17 @@ class StateFlow:
         free = slips - slips @ self.inverse @ self.rows[self.kept]
         return np.asarray(np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(slips, axis=1))
 
-    def spread(self, kept: np.ndarray, pushes: np.ndarray | float = 0.0) -> np.ndarray:
-        """Return the forces (2u, ...) of all rows from those of the kept rows (k, ...) and of springs (p, ...)."""
+    def spread(self, solved: np.ndarray, pushes: np.ndarray | float = 0.0) -> np.ndarray:
+        """Return the forces (2u, ...) of all rows from those solved for (k, ...) and of springs (p, ...)."""
         acting, count = np.concatenate([self.closed, self.pressed]), len(self.closed)
-        forces = np.zeros((2 * self.u, *kept.shape[1:]), kept.dtype)
-        forces[self.closed], forces[self.pressed] = kept[:count], pushes
+        forces = np.zeros((2 * self.u, *solved.shape[1:]), solved.dtype)
+        forces[self.closed], forces[self.pressed] = solved[:count], pushes
         forces[self.u + acting] = -(self.drag[acting] * forces[acting].T).T
-        forces[self.u + self.stick] = kept[count:]
+        forces[self.u + self.stick] = solved[count:]
         return forces
 
     def followed(self, motion: np.ndarray) -> np.ndarray:
-        """Return motions (N, ...) with sliders as they are: at rest, or as what draws them."""
+        """Return motions (N, ...) with sliders as they are: at rest, or as their drivers."""
         size, moved = len(self.root), motion.copy()
         moved[size - self.sliders :] = 0.0
         for a, row in zip(size - self.sliders + self.follows, self.system.elongation[self.follows], strict=True):
@@ -149,7 +149,7 @@ class StateFlow:
         return moved
 
     def settled(self, motion: np.ndarray, terms: np.ndarray) -> np.ndarray:
-        """Return motions as `followed` does; what constraints hold is at rest, not at round-off of terms (N, c)."""
+        """Return motions as `followed` does; constrained rows are at rest, not at round-off of terms (N, c)."""
         moved = self.followed(motion)
         moved[np.abs(moved) <= HELD_ROUND_OFF * np.abs(terms).max(axis=0, initial=0.0)] = 0.0
         return moved
@@ -157,7 +157,7 @@ class StateFlow:
     # --- as functionals of (s, s', 1, cos(omega_h t), sin(omega_h t)), K of them
 
     def known_forces(self, open_force: np.ndarray) -> np.ndarray:
-        """Return the forces (2u, K) of springs, of what slides at its limit, and of constants `open_force` (2u,)."""
+        """Return the forces (2u, K) of springs, of sliders at their limits, and of constants `open_force` (2u,)."""
         one, columns = 2 * len(self.root), 2 * len(self.root) + 1 + 2 * len(self.load)
         pushes = np.zeros((len(self.pressed), columns))
         pushes[:, :one], pushes[:, one] = -np.hstack([self.spring, self.dashpot]), -self.preload
@@ -167,7 +167,7 @@ class StateFlow:
         return forces
 
     def free(self, open_force: np.ndarray) -> np.ndarray:
-        """Return the accelerations (N, K) without what the kept rows carry. open_force: as in known_forces."""
+        """Return the accelerations (N, K) without the kept rows' forces. open_force: as in known_forces."""
         constant = self.weight - self.push @ self.preload + open_force @ self.drawn
         loads = constant[:, None], self.load.real.T, -self.load.imag.T
         return np.hstack([-self.stiffness, -self.damping, *loads])
@@ -184,7 +184,7 @@ class StateFlow:
 
 
 def _forces(rows: np.ndarray, wrench: np.ndarray, squared: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the forces of kept rows (k, N), accelerations (N, N), both by loads, and what is left (StateFlow.left)."""
+    """Return the forces of kept rows (k, N), accelerations (N, N), both by loads, and StateFlow.left."""
     size = rows.shape[1]
     if not len(rows):
         return np.zeros((0, size)), np.eye(size), 0.0

@@ -1,4 +1,4 @@
-"""The system of bodies that only slide, as the kernels for sliders take it: rows in place of units.
+"""The system of bodies that only slide, as the kernels for sliders take it: rows instead of units.
 
 Friction rows come first, one for the slip of each body on its floor and one for each friction damper, then contact
 rows. A body is one coordinate; Jenkins elements have their springs in their rows, not sliders of their own. A gap
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vanedamp.coupling.numerics.compiler.record import record_with
-from vanedamp.coupling.system.system import FLOOR, Part, System
+from vanedamp.coupling.system.system import FLOOR, CoordinateBlock, System
 
 #: relative tolerance of a wall that moves as the floor does
 _ALIKE = 1e-14
@@ -58,12 +58,12 @@ class LineSystem(NamedTuple):
     outputs: np.ndarray  # (k, n) functionals of further outputs
 
     @property
-    def of_structure(self) -> Part:
+    def of_structure(self) -> CoordinateBlock:
         """The part of the modal coordinates."""
         return self._part(slice(0, self.modes))
 
     @property
-    def of_bodies(self) -> Part:
+    def of_bodies(self) -> CoordinateBlock:
         """The part of the bodies."""
         return self._part(slice(self.modes, None))
 
@@ -82,8 +82,8 @@ class LineSystem(NamedTuple):
         phasors: np.ndarray = np.exp(1j * np.multiply.outer(angle, self.order))
         return phasors
 
-    def _part(self, at: slice) -> Part:
-        return Part(
+    def _part(self, at: slice) -> CoordinateBlock:
+        return CoordinateBlock(
             self.mass[at], self.stiffness[at], self.damping[at, at], self.load[:, at], self.weight[at],
             self.response[at], self.J[:, at],
         )  # fmt: skip

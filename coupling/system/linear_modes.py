@@ -7,7 +7,7 @@ can. Their complex modes decay by themselves:
     x(t) = steady + Re sum_k a_k exp(lambda_k t)
 
 with a_k from the difference of the scene's start and the steady motion (Tisseur and Meerbergen, SIAM Review 43, 2001).
-The modes are computed once (LinearParts); frequency, loads and start only change what they begin with (`set_modes`).
+The modes are computed once (LinearParts); frequency, loads and start only change initial amplitudes (`set_modes`).
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class LinearModes(NamedTuple):
     """
 
     steady: Annotated[np.ndarray, "1"]  # its amplitude, m (of several harmonics the root of the squares)
-    begun: Annotated[np.ndarray, "m"]  # amplitudes at time zero of what is not steady, m
+    begun: Annotated[np.ndarray, "m"]  # amplitudes at time zero of the transient, m
     rate: Annotated[np.ndarray, "m"]  # decay, 1/s
     own: Annotated[np.ndarray, "m"]  # angular frequency, rad/s
     felt: Annotated[np.ndarray, "m", bool]  # whether the response moves
@@ -106,8 +106,8 @@ def _system(
         drawn = np.isfinite(system.casing_spring)
         rows = system.casing[drawn] @ basis
         stiffness += rows.T @ (system.casing_spring[drawn, None] * rows)
-    place = np.r_[np.arange(system.modes), system.modes + np.flatnonzero(moving)]
-    return _with_modes((mass, damping, stiffness), basis, place, system.response @ basis, system.weight @ basis)
+    columns = np.r_[np.arange(system.modes), system.modes + np.flatnonzero(moving)]
+    return _with_modes((mass, damping, stiffness), basis, columns, system.response @ basis, system.weight @ basis)
 
 
 def _rolling(scene: Scene) -> np.ndarray:
@@ -116,22 +116,22 @@ def _rolling(scene: Scene) -> np.ndarray:
 
 
 def _static(stiffness: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the displacements under weight; of what no spring holds, the least."""
+    """Return the displacements under weight; the least where no spring holds."""
     if not weight.any():
         return np.zeros(len(weight))
     return np.asarray(np.linalg.lstsq(stiffness, weight, rcond=None)[0])
 
 
 def _with_modes(
-    together: tuple[np.ndarray, ...], basis: np.ndarray, place: np.ndarray, response: np.ndarray, weight: np.ndarray
+    together: tuple[np.ndarray, ...], basis: np.ndarray, columns: np.ndarray, response: np.ndarray, weight: np.ndarray
 ) -> tuple[LinearParts, LinearModes]:
     """Return a system with its modes. together: mass, damping and stiffness; others as in LinearParts."""
     mass, damping, stiffness = together
     k, static = len(response), _static(stiffness, weight)
     diagonal = all(np.count_nonzero(matrix) == np.count_nonzero(np.diag(matrix)) for matrix in together)
     if diagonal:
-        own = np.diag(mass)
-        values, shapes, seen = _oscillators(np.diag(stiffness) / own, np.diag(damping) / own)
+        masses = np.diag(mass)
+        values, shapes, seen = _oscillators(np.diag(stiffness) / masses, np.diag(damping) / masses)
         both = np.r_[response, response]
         felt, seen, inverse = np.abs(both * shapes), both * seen, np.zeros((0, 0), complex)
     else:
@@ -139,7 +139,7 @@ def _with_modes(
         seen = response @ shapes
         felt = np.abs(seen)
     parts = LinearParts(
-        diagonal, float(weight @ static) / 2, mass, damping, stiffness, basis, place, response, static, values, seen,
+        diagonal, float(weight @ static) / 2, mass, damping, stiffness, basis, columns, response, static, values, seen,
         inverse,
     )  # fmt: skip
     return parts, room(
@@ -150,7 +150,7 @@ def _with_modes(
 
 @strict
 def set_modes(parts, modes, load, frequency, q, v):
-    """Set the steady amplitude of the response, and what is not steady at time zero.
+    """Set the steady amplitude of the response, and the transient at time zero.
 
     load: (e, N) complex, N; frequency: (e,) rad/s; q, v: (n + b,) the start of modes and bodies.
     """
@@ -168,15 +168,15 @@ def set_modes(parts, modes, load, frequency, q, v):
         square += x.real * x.real + x.imag * x.imag
     modes.steady[0] = math.sqrt(square)
     for j in range(2 * k):
-        part = 0j
+        amplitude = 0j
         if parts.diagonal:
             other = parts.value[j + k if j < k else j - k]
-            part = start[k + j % k] - other * start[j % k]
+            amplitude = start[k + j % k] - other * start[j % k]
         else:
             for i in range(2 * k):
-                part += parts.inverse[j, i] * start[i]
-        part *= parts.seen[j]
-        modes.begun[j] = math.hypot(part.real, part.imag)
+                amplitude += parts.inverse[j, i] * start[i]
+        amplitude *= parts.seen[j]
+        modes.begun[j] = math.hypot(amplitude.real, amplitude.imag)
 
 
 @strict
@@ -221,7 +221,7 @@ def _oscillators(square: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, n
 
 @lru_cache(maxsize=32)
 def _complex(k: int, mass: bytes, damping: bytes, stiffness: bytes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return eigenvalues (2k,), shapes (k, 2k) of one energy, and what takes (q, q') (2k,) to their parts (2k, 2k)."""
+    """Return eigenvalues (2k,), shapes (k, 2k) of one energy, and the map of (q, q') (2k,) to their parts (2k, 2k)."""
     M, C, K = (np.frombuffer(matrix).reshape(k, k) for matrix in (mass, damping, stiffness))
     solved = np.linalg.solve(M, np.hstack([-K, -C]))
     values, vectors = np.linalg.eig(np.vstack([np.hstack([np.zeros((k, k)), np.eye(k)]), solved]))

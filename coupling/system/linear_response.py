@@ -1,4 +1,4 @@
-"""The linear references of a damped response: without bodies, and with every body fixed to its floor."""
+"""The linear references of a damped response: without bodies, and with bodies fixed."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class LinearResponse:
     def amplitude(self, frequencies: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
         """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak per period.
 
-        load: (f, e, n) at each of them in place of its own. Infinite at a frequency that is, to the last bit, a
+        load: (f, e, n) at each instead of its own. Infinite at a frequency that is, to the last bit, a
         resonance without damping. The same digits for one frequency as for many.
         """
         return self.heights(self.motions(frequencies, load))
@@ -73,7 +73,7 @@ class LinearResponse:
         return amplitude
 
     def amplitudes(self, frequency: float, rows: np.ndarray) -> np.ndarray:
-        """Return amplitudes (s,) of functionals (s, n) in place of the response, at a frequency, Hz.
+        """Return amplitudes (s,) of functionals (s, n) instead of the response, at a frequency, Hz.
 
         Infinite at a frequency that is, to the last bit, a resonance without damping.
         """
@@ -133,14 +133,14 @@ class LinearResponse:
         """Return height and frequency of the maximum around a point of the grid; that point at an edge."""
         from scipy.optimize import minimize_scalar
 
-        found = float(heights[top]), float(grid[top])
+        peak = float(heights[top]), float(grid[top])
         if 0 < top < len(grid) - 1:
             refined = minimize_scalar(
                 lambda frequency: -float(self.amplitude(np.array([frequency]))[0]),
                 bounds=(grid[top - 1], grid[top + 1]), method="bounded", options={"xatol": 1e-9 * grid[top]},
             )  # fmt: skip
-            found = max(found, (-float(refined.fun), float(refined.x)))
-        return found
+            peak = max(peak, (-float(refined.fun), float(refined.x)))
+        return peak
 
     def resonances(self) -> tuple[np.ndarray, np.ndarray]:
         """Return frequencies at which a harmonic meets a natural one, and half-power widths there (e n,), Hz."""
@@ -227,7 +227,7 @@ def _resonances(
 
 
 def linear_responses(scene: Scene, system: System | None = None) -> tuple[LinearResponse, LinearResponse]:
-    """Return the responses without bodies, and with every body fixed to its cavity's floor. system: of the scene.
+    """Return the responses without bodies, and with bodies fixed. system: of the scene.
 
     Raises InputError, also for an excitation that is no sum of sines: the peak that a truncated Fourier series leaves
     out has no bound that holds for every waveform.
@@ -248,14 +248,14 @@ def linear_responses(scene: Scene, system: System | None = None) -> tuple[Linear
 
 
 def fixed_mass(system: System) -> np.ndarray:
-    """Return the modal mass matrix (n, n) of the structure with every body fixed to its floor."""
+    """Return the modal mass matrix (n, n) of the structure with bodies fixed."""
     return mass_of(system, attached(system, np.ones(system.bodies, bool)))
 
 
 def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np.ndarray:
     """Return the complex displacement of the response per newton at `excitation.at`, m/N, shape (f,).
 
-    Without bodies, or (`fixed`) with every body fixed to its cavity's floor.
+    Without bodies, or (`fixed`) with bodies fixed.
     """
     system = assemble(scene)
     modes, mass = system.of_structure, fixed_mass(system) if fixed else np.eye(system.modes)

@@ -94,14 +94,14 @@ def basis_of(scene: Scene) -> ModalBasis:
     if active() is None or not isinstance(structure, Rom):
         return structure_basis(structure, speed)
     here = structure_basis(*plain((structure, speed)))
-    found: ModalBasis = opaque(lambda one, at: _aligned(structure_basis(one, at), here), structure, speed)
-    return found
+    basis: ModalBasis = opaque(lambda one, at: _aligned(structure_basis(one, at), here), structure, speed)
+    return basis
 
 
 def _aligned(basis: ModalBasis, like: ModalBasis) -> ModalBasis:
     """Return a basis whose modes have the signs of a neighbouring one's."""
-    own, other = ([*each.rows.values(), *each.base.T] for each in (basis, like))
-    sign = np.where(sum(a * b for a, b in zip(own, other, strict=True)) < 0.0, -1.0, 1.0)
+    rows, other = ([*each.rows.values(), *each.base.T] for each in (basis, like))
+    sign = np.where(sum(a * b for a, b in zip(rows, other, strict=True)) < 0.0, -1.0, 1.0)
     turned: dict[str, Any] = {
         name: None if (one := getattr(basis, name)) is None else one * sign for name in ("in_file", "inertia")
     }
@@ -132,14 +132,14 @@ def structure_basis(structure: Structure, speed: float) -> ModalBasis:
     return _rom_basis(structure, speed, file_stamp(structure.file))
 
 
-# a basis is small, and a sweep over speeds comes back to each of them
+# a basis is small, and a sweep over speeds comes back to each
 @lru_cache(maxsize=256)
 def _rom_basis(structure: Rom, speed: float, _stamp: int) -> ModalBasis:
-    found = restricted(structure, speed)
-    basis, shapes = modal_basis(found.model), found.model.natural[1]
-    if found.in_file is None or found.inertia is None:
+    model = restricted(structure, speed)
+    basis, shapes = modal_basis(model.model), model.model.natural[1]
+    if model.in_file is None or model.inertia is None:
         return basis
-    return replace(basis, in_file=frozen(found.in_file @ shapes), inertia=frozen(found.inertia @ shapes))
+    return replace(basis, in_file=frozen(model.in_file @ shapes), inertia=frozen(model.inertia @ shapes))
 
 
 def moved(structure: Structure) -> Structure:
@@ -164,8 +164,8 @@ def transfer_of(scene: Scene, before: float) -> np.ndarray:
         assert first.in_file is not None and last.inertia is not None
         return last.inertia.T @ first.in_file
 
-    found: np.ndarray = opaque(transfer, scene.structure, scene.speed)
-    return found
+    matrix: np.ndarray = opaque(transfer, scene.structure, scene.speed)
+    return matrix
 
 
 def modal_transfer(structure: Rom, before: float, after: float) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Amplitudes at which bodies begin to slip on their floors and to hit their walls, known before any run.
 
 A body that the floor moves by R sin(omega t) sticks while its inertia stays below its friction. Beyond, it slips: to
-and fro about its place, or downhill where its cavity is inclined, until it lies at the lower wall. The amplitudes are
+and fro, or downhill where its cavity is inclined, until it lies at the lower wall. The amplitudes are
 for motions that grow slowly; a transient may lead to impacts at smaller ones.
 """
 
@@ -80,16 +80,16 @@ def onsets(scene: Scene) -> list[Onset | None]:
     reach = np.abs(system.floor[:, : system.modes] @ wave + bodies.load[0] / (bodies.mass * omega**2))
     positions = scene.positions
     friction, pull = system.holds / bodies.mass, bodies.weight / bodies.mass
-    found: list[Onset | None] = []
+    results: list[Onset | None] = []
     for index, damper in enumerate(scene.damper):
         cavity = scene.cavity[scene.cavity_of(damper)]
         row = scene.bodies_in(cavity)
         alike = len(row) == 1 or (np.ptp(friction[row]) == 0.0 and not pull[row].any())
         lies = not damper.form.rolls and not (damper.lift or damper.tilt)
         if damper.sprung or not alike or not lies or not reach[index] or not response:
-            found.append(None)
+            results.append(None)
             continue
         room = cavity.gap / 2 - max(abs(positions[other]) for other in row)
-        own, ratio = onset(room, friction[index], pull[index], omega), response / reach[index]
-        found.append(Onset(own.slip * ratio, own.impact * ratio))
-    return found
+        single, ratio = onset(room, friction[index], pull[index], omega), response / reach[index]
+        results.append(Onset(single.slip * ratio, single.impact * ratio))
+    return results

@@ -35,7 +35,7 @@ class Restricted(NamedTuple):
 
 
 class RingFacts(NamedTuple):
-    """What a scene needs to know of a reduced ring: number of sectors, and the labels of one."""
+    """Of a reduced ring: number of sectors, and the labels of one."""
 
     sectors: int
     labels: tuple[str, ...]
@@ -86,7 +86,7 @@ def greatest_speed(structure: Rom) -> float:
 
 
 def hot_spots_in_file(structure: Structure) -> dict[str, dict[str, Any]]:
-    """Return what is known of the hot spots of a structure by name (rom.recovery.hot_spots); empty without any."""
+    """Return data of the hot spots of a structure by name (rom.recovery.hot_spots); empty without any."""
     if not isinstance(structure, Rom):
         return {}
     return hot_spots(_whole(structure))
@@ -107,19 +107,19 @@ def _restricted(structure: Rom, speed: float, _stamp: int) -> Restricted:
     if whole.greatest_speed == 0.0:
         return Restricted(_cut(model, structure))
     # outputs are functionals of the coordinates, which follow these through every change: so do the coordinates
-    own, rows = tuple(f"q{index}" for index in range(whole.size)), np.eye(whole.size)
+    names, rows = tuple(f"q{index}" for index in range(whole.size)), np.eye(whole.size)
     given = len(model.outputs)
     if model.output_rows is not None:
         rows = np.vstack([model.output_rows, rows])
-    marked = _cut(replace(model, outputs=(*model.outputs, *own), output_rows=rows, output_residual=None), structure)
+    marked = _cut(replace(model, outputs=(*model.outputs, *names), output_rows=rows, output_residual=None), structure)
     assert marked.output_rows is not None
     in_file = marked.output_rows[given:]
-    kept: dict[str, Any] = {
+    changes: dict[str, Any] = {
         "outputs": model.outputs,
         "output_rows": marked.output_rows[:given] if given else None,
         "output_residual": None if marked.output_residual is None or not given else marked.output_residual[:given],
     }
-    return Restricted(replace(marked, **kept), in_file, whole.mass @ in_file)
+    return Restricted(replace(marked, **changes), in_file, whole.mass @ in_file)
 
 
 def _cut(model: ReducedModel, structure: Rom) -> ReducedModel:

@@ -75,8 +75,8 @@ def force_shapes(scene: Scene, basis: ModalBasis, response: np.ndarray) -> np.nd
         return array(list(shares.values()), complex)[:, None] * response
     shapes = zeros((len(shares), len(response)), dtype=complex)
     orders = list(shares)
-    for place, load in scene.excitation.loads.items():
-        row = interface_row(basis, load.at, f"{place}.at" if scene.excitation.load else place)
+    for key, load in scene.excitation.loads.items():
+        row = interface_row(basis, load.at, f"{key}.at" if scene.excitation.load else key)
         if load.order in orders:  # one without force has no order
             shapes[orders.index(load.order)] += load.amplitude * row
     return shapes
@@ -91,7 +91,7 @@ def steady_motion(
     """
     loads = np.broadcast_to(force, (len(omega), force.shape[-1]))[:, :, None]
     parts = np.array_split(np.arange(len(omega)), 1 + len(omega) * len(stiffness) ** 2 // _TOGETHER)
-    return np.concatenate([_solved(stiffness, damping, mass, loads[part], omega[part]) for part in parts])
+    return np.concatenate([_solved(stiffness, damping, mass, loads[rows], omega[rows]) for rows in parts])
 
 
 def _solved(
@@ -118,9 +118,9 @@ def force_amplitude(scene: Scene, basis: ModalBasis, response: np.ndarray) -> fl
         return excitation.resonance_amplitude / meant
     if active() is None:
         return excitation.resonance_amplitude / _chosen(scene, basis, response).flexibility
-    found = _chosen(*plain((scene, basis, response)))
+    chosen = _chosen(*plain((scene, basis, response)))
     # at its highest, the response does not change with the frequency
-    omega = 2 * np.pi * found.frequency
+    omega = 2 * np.pi * chosen.frequency
     dynamic = np.diag(basis.stiffness - omega**2) + 1j * omega * basis.damping
     force = force_shapes(scene, basis, response)[0] if excitation.distributed else response
     return excitation.resonance_amplitude / abs(response @ solve(dynamic, force))
@@ -233,5 +233,5 @@ def _resonance(stiffness_: bytes, damping_: bytes, response_: bytes, force_: byt
 
     width = min(1.5 * damping[mode, mode] / resonance, 0.5)
     bounds = (resonance * (1 - width), resonance * (1 + width))
-    found = minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-9 * resonance})
-    return float(found.x) / (2 * np.pi), -float(found.fun)
+    maximum = minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-9 * resonance})
+    return float(maximum.x) / (2 * np.pi), -float(maximum.fun)

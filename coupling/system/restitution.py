@@ -13,7 +13,7 @@ from vanedamp.files.toml_input import InputError
 
 
 class Contacts(Protocol):
-    """What a system says of the restitutions (r,) of its contacts: coefficients, and the law that takes them."""
+    """Restitutions (r,) of a system's contacts: coefficients, and the law that takes them."""
 
     @property
     def restitution(self) -> np.ndarray:

@@ -65,10 +65,10 @@ def _check_diameters(scene: Scene, ring: RingFacts) -> None:
 
     structure, excitation = scene.structure, scene.excitation
     assert isinstance(structure, Ring)
-    kept = modes_of_ring(structure)
-    if kept is None or excitation.distributed or excitation.base_acceleration is not None:
+    modes = modes_of_ring(structure)
+    if modes is None or excitation.distributed or excitation.base_acceleration is not None:
         return
-    count, diameters = kept
+    count, diameters = modes
     wave, whose = excitation.travelling, "a force at one label excites"
     excited = set(range(ring.sectors // 2 + 1))
     if wave is not None:
@@ -91,13 +91,13 @@ def sectors_of(given: Sectors, count: int, key: str) -> list[int]:
     """Return the numbers of the sectors that a table names of a ring with `count`. Raises InputError for others."""
     if isinstance(given, str):
         return list(range(0, count, 2 if given == "alternate" else 1))
-    found = [given] if isinstance(given, int) else list(given)
-    for place, sector in enumerate(found):
+    sectors = [given] if isinstance(given, int) else list(given)
+    for index, sector in enumerate(sectors):
         if sector >= count:
             raise InputError(f"{key}: the ring has no sector {sector}; its {count} sectors are 0 to {count - 1}")
-        if sector in found[:place]:
+        if sector in sectors[:index]:
             raise InputError(f"{key}: sector {sector} is given twice")
-    return found
+    return sectors
 
 
 def _label(label: str, sector: int, ring: RingFacts, key: str, repeated: bool = False) -> str:
@@ -134,23 +134,23 @@ def _cavities(scene: Scene, ring: RingFacts) -> tuple[tuple[Cavity, ...], list[t
         draws = _Draws(cavity, index, len(row), ring.sectors)
         sectors = sectors_of(cavity.sectors, ring.sectors, f"cavity[{index}].sectors")
         for sector in sectors:
-            own: dict[str, Any] = {
+            labels: dict[str, Any] = {
                 side: _label(label, sector, ring, f"cavity[{index}].{side}", len(sectors) > 1)
                 for side in _SURFACES
                 if (label := getattr(cavity, side)) is not None
             }
             name, gap = f"{cavity.name}@{sector}", draws.gap(sector)
-            cavities.append(replace(cavity, name=name, gap=gap, sectors=None, scatter=None, **own))
+            cavities.append(replace(cavity, name=name, gap=gap, sectors=None, scatter=None, **labels))
             places = draws.positions([positions[number] for number, _ in row], sector)
             bodies += [
-                (number, replace(body, cavity=name, position=place))
-                for (number, body), place in zip(row, places, strict=True)
+                (number, replace(body, cavity=name, position=position))
+                for (number, body), position in zip(row, places, strict=True)
             ]
     return tuple(cavities), bodies
 
 
 class _Draws:
-    """What the scatter of a cavity draws in all sectors: a gap for each, and a position for each of its bodies."""
+    """Draws of a cavity's scatter in all sectors: a gap for each, and a position for each of its bodies."""
 
     def __init__(self, cavity: Cavity, index: int, bodies: int, sectors: int) -> None:
         self.cavity, self.scatter = cavity, cavity.scatter
@@ -172,28 +172,28 @@ class _Draws:
         half = 0.5 * self.gap(sector)
         places = np.array(written) * (2.0 * half / self.cavity.gap)
         places = places + self.scatter.position * half * self._position[sector]
-        found: list[float] = np.sort(np.clip(places, -half, half)).tolist()
-        return found
+        positions: list[float] = np.sort(np.clip(places, -half, half)).tolist()
+        return positions
 
 
 def _repeated(
     entries: Sequence[Any], table: str, keys: Sequence[str], shown: str, ring: RingFacts
 ) -> list[tuple[int, Any]]:
     """Return the entries of a table of the structure, over their sectors, each with its number in the scene."""
-    found = []
+    copies = []
     for number, entry in enumerate(entries):
         if entry.sectors is None:
-            found.append((number, entry))
+            copies.append((number, entry))
             continue
         sectors = sectors_of(entry.sectors, ring.sectors, f"{table}[{number}].sectors")
         for sector in sectors:
-            own = {
+            labels = {
                 key: _label(label, sector, ring, f"{table}[{number}].{key}", len(sectors) > 1)
                 for key in keys
                 if (label := getattr(entry, key) or (shown if key == "at" else None)) is not None
             }
-            found.append((number, replace(entry, sectors=None, **own)))
-    return found
+            copies.append((number, replace(entry, sectors=None, **labels)))
+    return copies
 
 
 def _excitation(excitation: Excitation, ring: RingFacts) -> Excitation:
@@ -215,15 +215,15 @@ def _excitation(excitation: Excitation, ring: RingFacts) -> Excitation:
 
 def _places(numbers: Sequence[int]) -> dict[int, list[int]]:
     """Return where each entry of a scene stands once it is repeated, by its number."""
-    found: dict[int, list[int]] = {}
-    for place, number in enumerate(numbers):
-        found.setdefault(number, []).append(place)
-    return found
+    by_number: dict[int, list[int]] = {}
+    for index, number in enumerate(numbers):
+        by_number.setdefault(number, []).append(index)
+    return by_number
 
 
 def _pairs(pairs: Sequence[WearPair], copies: Mapping[str, Mapping[int, list[int]]]) -> Iterator[WearPair]:
-    """Yield the contacts with rates of their own, by the numbers of what is repeated."""
+    """Yield the contacts with rates of their own, by the numbers of repeated tables."""
     for pair in pairs:
-        own = copies.get(pair.side or "", copies[""])
-        numbers = [None] if pair.damper is None else own.get(pair.damper, [pair.damper])
+        of_side = copies.get(pair.side or "", copies[""])
+        numbers = [None] if pair.damper is None else of_side.get(pair.damper, [pair.damper])
         yield from (replace(pair, damper=number) for number in numbers)

@@ -20,7 +20,7 @@ from vanedamp.rom.reduced import NORMAL, ROTATION
 
 
 class Surface(NamedTuple):
-    """Motion (n,) of a surface of a cavity, along and across at a place (x, y) of it, and its rotation.
+    """Motion (n,) of a surface of a cavity, along and across at (x, y) of it, and its rotation.
 
     x, y: m, from the middle of the floor, along and across; None: the contact's, wherever the surface is.
     """
@@ -44,21 +44,21 @@ def heights(scene: Scene) -> np.ndarray:
     Sliders in one cavity have the mean of their heights by mass: two that touch and are nowhere held move freely
     of the structure only if it moves them alike.
     """
-    found = array([damper.half_extent[1] for damper in scene.damper])
+    height = array([damper.half_extent[1] for damper in scene.damper])
     mass = array([damper.mass for damper in scene.damper])
     for cavity in scene.cavity:
         row = np.array([k for k in scene.bodies_in(cavity) if not scene.damper[k].form.planar], int)
-        known = row[values(found)[row] > 0.0]
+        known = row[values(height)[row] > 0.0]
         if known.size:
-            found[row] = (mass[known] @ found[known]) / mass[known].sum()
-    return found
+            height[row] = (mass[known] @ height[known]) / mass[known].sum()
+    return height
 
 
 def surfaces_of(scene: Scene, basis: ModalBasis, index: int) -> tuple[Surface, ...]:
     """Return left wall, right wall, floor and ceiling of a cavity; a rigid structure's one mode moves them alike.
 
     A surface whose label has no coordinates across and of rotation moves as the floor's rigid motion has it. Raises
-    InputError for unknown labels, and for a rotation that is given twice or whose place is not known.
+    InputError for unknown labels, and for a rotation that is given twice or whose position is unknown.
     """
     cavity, (left, right, below) = scene.cavity[index], surface_labels(scene, index)
     labels, key = (left, right, below, cavity.ceiling or below), f"cavity[{index}]"
@@ -77,22 +77,22 @@ def surfaces_of(scene: Scene, basis: ModalBasis, index: int) -> tuple[Surface, .
         x: float | None
         y: float | None
         x, y = (0.0, 0.0) if places is None else places[side]
-        own = label != below and label + NORMAL in basis.rows
-        if label != below and label + ROTATION in basis.rows and (places is None or not own):
+        has_normal = label != below and label + NORMAL in basis.rows
+        if label != below and label + ROTATION in basis.rows and (places is None or not has_normal):
             raise InputError(
                 f"{key}.{SIDES[side]}: '{label}' has a rotation, but '{label}' or '{below}' lacks its place or its "
                 'motion across; take kind = "patch" for both'
             )
-        if not own:
+        if not has_normal:
             x = x_floor
         elif side != CEILING:
             x = None  # a wall is touched on its plane, and a ceiling, wherever they are
         if side == CEILING and label != below:
             y = None
-        moves_across = basis.rows[label + NORMAL] if own else across
+        moves_across = basis.rows[label + NORMAL] if has_normal else across
         names = (
             label,
-            (label if own else below) + NORMAL,
+            (label if has_normal else below) + NORMAL,
             (label if label + ROTATION in basis.rows else below) + ROTATION,
         )
         first, second, third = (name if name in basis.rows else "" for name in names)
@@ -116,7 +116,7 @@ def walls_and_floor(scene: Scene, basis: ModalBasis, index: int) -> tuple[Surfac
 
 
 def _places(basis: ModalBasis, labels: tuple[str, ...]) -> list[tuple[float, float]] | None:
-    """Return the places (x, y) of a cavity's surfaces, m from the middle of the floor; None where these are unknown.
+    """Return the positions (x, y) of a cavity's surfaces, m from the middle of the floor; None where these are unknown.
 
     labels: of left wall, right wall, floor and ceiling.
     """

@@ -28,13 +28,13 @@ LEFT, RIGHT, FLOOR, CEILING, BODY, STOP, CASING = range(len(SURFACES))
 
 
 def surface_code(name: str) -> int:
-    """Return the place of a name in SURFACES, where it is put if it is new."""
+    """Return the index of a name in SURFACES, which is added if new."""
     if name not in SURFACES:
         SURFACES.append(name)
     return SURFACES.index(name)
 
 
-class Part(NamedTuple):
+class CoordinateBlock(NamedTuple):
     """The part of a system that belongs to k of its coordinates."""
 
     mass: np.ndarray  # (k,)
@@ -90,7 +90,7 @@ class System(NamedTuple):
     play: np.ndarray  # (u,) free travel, m: the scale of a contact's gap; inf for friction elements
     body: np.ndarray  # (u,) number of the unit's body, the left one of two; without a body, of its own table
     other: np.ndarray  # (u,) number of the body to its right; -1: none
-    surface: np.ndarray  # (u,) int: place of its name in SURFACES
+    surface: np.ndarray  # (u,) int: index of its name in SURFACES
     corner: np.ndarray  # (u,) int: 0 to 3, counterclockwise from the lower left one; -1: none
     along: np.ndarray  # (b,) coordinate x of each body
     tilt: np.ndarray  # (b,) coordinate of its tilt, -1: none
@@ -110,19 +110,19 @@ class System(NamedTuple):
     outputs: np.ndarray = np.zeros((0, 0))
 
     @property
-    def of_structure(self) -> Part:
+    def of_structure(self) -> CoordinateBlock:
         """The part of the modal coordinates, without bodies."""
         at = slice(0, self.modes)
-        return Part(
+        return CoordinateBlock(
             self.mass[at], self.squares, self.viscous, self.load[:, at], self.weight[at], self.response[at],
             self.J[:, at],
         )  # fmt: skip
 
     @property
-    def of_bodies(self) -> Part:
+    def of_bodies(self) -> CoordinateBlock:
         """The part of the positions of the bodies along their cavities."""
         at = self.along
-        return Part(
+        return CoordinateBlock(
             self.mass[at], np.zeros(len(at)), self.damping[np.ix_(at, at)], self.load[:, at], self.weight[at],
             self.response[at], self.J[:, at],
         )  # fmt: skip
@@ -134,7 +134,7 @@ class System(NamedTuple):
 
     @property
     def without_body(self) -> np.ndarray:
-        """Whether each unit (u,) moves no body: it is between places of the structure, or one and the ground."""
+        """Whether each unit (u,) moves no body: it is between points of the structure, or one and the ground."""
         bodies = slice(self.modes, len(self.mass) - len(self.tangential))
         moves: np.ndarray = self.J[:, bodies].any(axis=1).reshape(2, -1).any(axis=0)
         return ~moves
@@ -162,7 +162,7 @@ class System(NamedTuple):
 
 
 def on_structure(system: System) -> System:
-    """Return the system whose slips of Jenkins elements follow their drivers, in place of their sliders."""
+    """Return the system whose slips of Jenkins elements follow their drivers, instead of their sliders."""
     if not len(system.tangential):
         return system
     J = system.J.copy()

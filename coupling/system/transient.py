@@ -25,7 +25,7 @@ from vanedamp.coupling.system.system import System
 LIMIT = 10_000
 #: periods up to which a run whose length is open is made longer until it is steady
 MOST = 24_000
-#: steady response, relative to what begins with it, below which a structure is at rest: an absorber without damping
+#: steady response, relative to its start, below which a structure is at rest: an absorber without damping
 #: leaves round-off, of which no fraction is ever reached
 _NOTHING = 1e-6
 #: fraction of the transient left when a short run of a choice has settled, and the fewest periods which that takes
@@ -50,8 +50,8 @@ class Length(NamedTuple):
 
 
 @record_with(free_axes=2)
-class Setup(NamedTuple):
-    """What is known of a scene before its run. What frequency, loads and start change is in arrays.
+class TransientInputs(NamedTuple):
+    """Data of a scene before its run; frequency, loads and start change arrays only.
 
     e harmonics, N coordinates, n modes, b bodies; `begin_transient` sets `excited`.
     """
@@ -80,7 +80,7 @@ class Setup(NamedTuple):
 class Transient:
     """The linear transient of a scene: its start, its rates of decay and its beats. system: the scene's.
 
-    numbers: what compiled functions take of it, (Setup, loose and held LinearModes); parts: of both (LinearParts).
+    numbers: for compiled functions, (TransientInputs, loose and held LinearModes); parts: of both (LinearParts).
     """
 
     def __init__(self, scene: Scene, system: System | None = None) -> None:
@@ -89,7 +89,7 @@ class Transient:
         (loose, free), (held, stuck) = systems[0], systems[-1]
         time, prescribed = scene.time, isinstance(scene.structure, Prescribed)
         q, v = start_of_modes(scene, self.system)
-        setup = Setup(
+        setup = TransientInputs(
             modes=self.system.modes, clock=np.array([self.system.omega, self.system.period]),
             frequency=self.system.frequency, load=self.system.load, q=q, v=v, excited=np.zeros(1, bool),
             driven=prescribed or scene.excitation.signal is not None, apart=len(systems) > 1,
@@ -118,7 +118,7 @@ class Transient:
         return self.numbers[0].weight_energy
 
     def settled_after(self, lengths: range, share: float | None = None) -> int:
-        """Return the first of rising numbers of periods that leaves at most a fraction; their end where none does.
+        """Return the first of rising numbers of periods that leaves at most a fraction; their end without.
 
         share: fraction of the steady response; default: `time.tolerance`.
         """
@@ -186,7 +186,7 @@ def _slowest(setup, modes, periods):
 
 @strict_entry
 def settled(setup, free, stuck, start, count, step, share):
-    """Return the first of `count` rising numbers of periods that leaves at most a share; their end where none does."""
+    """Return the first of `count` rising numbers of periods that leaves at most a fraction; their end without."""
     low, high = np.int64(0), count
     while low < high:
         middle = (low + high) >> 1

@@ -1,4 +1,4 @@
-"""What a unit is, and its gap, elongation, speeds and spring force at given coordinates."""
+"""A unit's kind, and its gap, elongation, speeds and spring force at given coordinates."""
 
 from __future__ import annotations
 

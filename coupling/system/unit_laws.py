@@ -103,14 +103,14 @@ class UnitEvent(NamedTuple):
         return np.asarray(sum(parts))
 
     def size(self, system: System, unit: int) -> float:
-        """Return the scale of the function of a unit, inf without one of its own."""
+        """Return the scale of the function of a unit, inf without."""
         return float(np.prod([getattr(system, name)[unit] for name in self.scale] or [np.inf])) or np.inf
 
 
 def signals_of(
     unit: int, gap: np.ndarray, speed: np.ndarray, force: np.ndarray, one: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Return what event functions of a unit are sums of: gap, its rate, slip speed, forces across and along, and one.
+    """Return the signals of event functions of a unit: gap, its rate, slip speed, forces across and along, and one.
 
     gap (..., u, K), speed and force (..., 2u, K), one (K,): functionals of a state. Signals: (..., K).
     """
@@ -165,7 +165,7 @@ class Grip(NamedTuple):
     An impact is this map: by Newton's law contacts that push leave at k times their speed of approach; by Poisson's
     they stop, and push again, k times as much or more. Slips that stick stop.
 
-    rows: (m + n, N) of J; lever: (N, m + n) what forces change the speeds by; solve: (m + n, m + n) forces by what
+    rows: (m + n, N) of J; lever: (N, m + n) speeds by forces; solve: (m + n, m + n) forces by what
     the rows are to gain, the least where rows depend on each other
     """
 

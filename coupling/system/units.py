@@ -36,7 +36,7 @@ _LIGHT = 1e-30
 class Body(NamedTuple):
     """A body: its number, its coordinate x, half its length and the height of its centre above the floor, m.
 
-    centre: place of its middle along the cavity while the bodies stand side by side, m.
+    centre: position of its middle along the cavity while the bodies stand side by side, m.
     """
 
     number: int
@@ -93,8 +93,8 @@ def layers_of(contact: ContactLaw, element: Element) -> tuple[tuple[float, Eleme
     """Return the elements that make up a contact (ContactLaw.layers)."""
     if type(contact).layers is ContactLaw.layers:
         return contact.layers(element)
-    found: tuple[tuple[float, Element], ...] = opaque(lambda law, own: law.layers(own), contact, element)
-    return found
+    layers: tuple[tuple[float, Element], ...] = opaque(lambda law, local: law.layers(local), contact, element)
+    return layers
 
 
 def layered(contact: ContactLaw, unit: Unit) -> Iterator[Unit]:
@@ -109,9 +109,9 @@ def contacts_of(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], bodies:
     Raises InputError for neighbours that do not meet at a common height.
     """
     length = 2 * sum(body.a for body in bodies)
-    for place, body in enumerate(bodies):
-        right = bodies[place + 1] if place + 1 < len(bodies) else None
-        if place == 0:
+    for index, body in enumerate(bodies):
+        right = bodies[index + 1] if index + 1 < len(bodies) else None
+        if index == 0:
             yield from _at_wall(law, cavity, surfaces, body, LEFT, -cavity.gap / 2 - length / 2)
         if right is None:
             yield from _at_wall(law, cavity, surfaces, body, RIGHT, cavity.gap / 2 + length / 2)
@@ -168,7 +168,7 @@ def _touching(
 
 
 def _between(law: Law, cavity: Cavity, surfaces: tuple[Surface, ...], left: Body, right: Body) -> Iterator[Unit]:
-    """Yield the contacts of two neighbours at the ends of what their faces have in common."""
+    """Yield the contacts of two neighbours at the ends of their common face."""
     if left.shape.extended != right.shape.extended:
         raise InputError(
             f"damper[{right.number}].shape: a slider and a body with extent share cavity '{cavity.name}'; a slider has "
@@ -225,7 +225,7 @@ class ElementParts(NamedTuple):
         return row
 
     def contact(self, normal: np.ndarray, restitution: float, *labels: str | None) -> Element:
-        """Return the scene's contact of a row between places of the structure."""
+        """Return the scene's contact of a row between points of the structure."""
         yields = sum(self.law.basis.flexibility({label or self.label: 1.0}) for label in labels)
         return self.law.element(normal, restitution, yields)
 

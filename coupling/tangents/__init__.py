@@ -1,1 +1,1 @@
-"""Numbers with their derivatives, which assembly, quantities and formulas take in the place of plain ones."""
+"""Numbers with their derivatives, which assembly, quantities and formulas take instead of plain ones."""

@@ -1,4 +1,4 @@
-"""Numbers with their derivatives, on which plain numpy works: formulas of quantities need not know of them.
+"""Numbers with their derivatives, on which plain numpy works: formulas of quantities need no change.
 
 Assembly makes its arrays by `zeros` and `array`: within `numbers(P)` they have derivatives by P numbers, and else they
 are numpy's. There a decision between equal values that turn apart is a kink, and raises NotSmooth.
@@ -49,7 +49,7 @@ def numbers(count: int | None) -> Iterator[None]:
     """Let `zeros` and `array` make numbers with derivatives by `count` numbers; None: plain ones."""
     before, _ACTIVE.count = _ACTIVE.count, count
     try:
-        with nullcontext() if count is None else np.errstate(all="ignore"):  # nan is what is not known
+        with nullcontext() if count is None else np.errstate(all="ignore"):  # nan: unknown
             yield
     finally:
         _ACTIVE.count = before
@@ -79,25 +79,25 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
         out = options.pop("out", None)
         if method != "__call__" or options:
             return NotImplemented
-        found = _called(ufunc, *inputs)
-        if out is None or found is NotImplemented:
-            return found
-        out[0][...] = found
+        result = _called(ufunc, *inputs)
+        if out is None or result is NotImplemented:
+            return result
+        out[0][...] = result
         return out[0]
 
     def __array_function__(self, function: Any, types: Any, given: tuple[Any, ...], options: dict[str, Any]) -> Any:
-        own = _FUNCTIONS.get(function.__name__)
-        return NotImplemented if own is None else own(*given, **options)
+        rule = _FUNCTIONS.get(function.__name__)
+        return NotImplemented if rule is None else rule(*given, **options)
 
-    def __getitem__(self, place: Any) -> Dual:
-        return Dual(self.value[place], self.turns[_of_turns(place)])
+    def __getitem__(self, key: Any) -> Dual:
+        return Dual(self.value[key], self.turns[_of_turns(key)])
 
-    def __setitem__(self, place: Any, given: Any) -> None:
-        self.value[place] = values(given)
-        self.turns[_of_turns(place)] = given.turns if isinstance(given, Dual) else 0.0
+    def __setitem__(self, key: Any, given: Any) -> None:
+        self.value[key] = values(given)
+        self.turns[_of_turns(key)] = given.turns if isinstance(given, Dual) else 0.0
 
     def __iter__(self) -> Iterator[Dual]:
-        return (self[place] for place in range(len(self.value)))
+        return (self[index] for index in range(len(self.value)))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -140,8 +140,8 @@ class Dual(np.lib.mixins.NDArrayOperatorsMixin):
 
     def sum(self, axis: int = -1, keepdims: bool = False) -> Dual:
         """Return the sum along an axis."""
-        own = axis % self.value.ndim
-        return Dual(self.value.sum(own, keepdims=keepdims), self.turns.sum(own, keepdims=keepdims))
+        along = axis % self.value.ndim
+        return Dual(self.value.sum(along, keepdims=keepdims), self.turns.sum(along, keepdims=keepdims))
 
     def mean(self) -> Dual:
         """Return the mean along the last axis."""
@@ -168,7 +168,7 @@ for _name, _ufunc in zip(
 
 def _called(ufunc: np.ufunc, *inputs: Any) -> Any:
     """Return a function of numbers, some of which have derivatives."""
-    if ufunc.__name__ == "matmul":  # numpy's own, or another function in its place
+    if ufunc.__name__ == "matmul":  # numpy's own, or another function
         return _product(*inputs)
     plain = [one.value if isinstance(one, Dual) else one for one in inputs]
     value = ufunc(*plain)
@@ -185,8 +185,8 @@ def _called(ufunc: np.ufunc, *inputs: Any) -> Any:
     turns: Any = None
     for one, slope in zip(inputs, _SLOPES[ufunc](*plain), strict=True):
         if isinstance(one, Dual):
-            own = one.turns if slope is None else np.asarray(slope)[..., None] * one.turns
-            turns = own if turns is None else turns + own
+            term = one.turns if slope is None else np.asarray(slope)[..., None] * one.turns
+            turns = term if turns is None else turns + term
     shape = (*np.shape(value), turns.shape[-1])
     return Dual(value, turns if turns.shape == shape else np.broadcast_to(turns, shape).copy())
 
@@ -221,12 +221,12 @@ def _product(one: Any, other: Any) -> Dual:
     return Dual(np.matmul(a, b), turns)
 
 
-def _of_turns(place: Any) -> Any:
-    """Return the place of derivatives: an ellipsis stands for the axes of values."""
-    if place is Ellipsis:
-        return place
-    steps = place if isinstance(place, tuple) else (place,)
-    return (*steps, slice(None)) if any(step is Ellipsis for step in steps) else place
+def _of_turns(key: Any) -> Any:
+    """Return the key of derivatives: an ellipsis stands for the axes of values."""
+    if key is Ellipsis:
+        return key
+    steps = key if isinstance(key, tuple) else (key,)
+    return (*steps, slice(None)) if any(step is Ellipsis for step in steps) else key
 
 
 def values(one: Any) -> Any:
@@ -240,8 +240,8 @@ def _turns(one: Any) -> Any:
 
 def _like(parts: Sequence[Any]) -> list[Dual]:
     """Return parts as numbers with derivatives, of which one has some."""
-    count = next(part.turns.shape[-1] for part in parts if isinstance(part, Dual))
-    return [part if isinstance(part, Dual) else Dual(part, np.zeros((*np.shape(part), count))) for part in parts]
+    count = next(value.turns.shape[-1] for value in parts if isinstance(value, Dual))
+    return [value if isinstance(value, Dual) else Dual(value, np.zeros((*np.shape(value), count))) for value in parts]
 
 
 def _joined(join: Any, parts: Sequence[Any], axis: int = 0) -> Dual:
@@ -275,7 +275,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 
 def active() -> int | None:
-    """Return by how many numbers derivatives are wanted; None: nobody wants any."""
+    """Return by how many numbers derivatives are wanted; None: none."""
     return _ACTIVE.count
 
 
@@ -292,8 +292,8 @@ def array(given: Any, dtype: type = float) -> Any:
         return np.array(given, dtype)
     value: np.ndarray = np.array(_plain(given), dtype)
     turns: np.ndarray = np.zeros((*value.shape, _ACTIVE.count), dtype)
-    for place, one in _numbers_in(given):
-        turns[place] = one.turns
+    for index, one in _numbers_in(given):
+        turns[index] = one.turns
     return Dual(value, turns)
 
 
@@ -301,12 +301,12 @@ def _plain(given: Any) -> Any:
     return [_plain(one) for one in given] if isinstance(given, list | tuple) else values(given)
 
 
-def _numbers_in(given: Any, place: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Dual]]:
+def _numbers_in(given: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Dual]]:
     if isinstance(given, Dual):
-        yield place, given
+        yield index, given
     elif isinstance(given, list | tuple):
         for number, one in enumerate(given):
-            yield from _numbers_in(one, (*place, number))
+            yield from _numbers_in(one, (*index, number))
 
 
 def scalar(one: Any) -> Any:
@@ -321,19 +321,21 @@ def vanishes(one: Any) -> bool:
 
 def inverse(matrix: Any) -> Any:
     """Return the inverse (n, n) of a matrix."""
-    found = np.linalg.inv(values(matrix))
+    inverted = np.linalg.inv(values(matrix))
     return (
-        Dual(found, -(found @ (Dual(matrix.value, matrix.turns) @ found)).turns) if isinstance(matrix, Dual) else found
+        Dual(inverted, -(inverted @ (Dual(matrix.value, matrix.turns) @ inverted)).turns)
+        if isinstance(matrix, Dual)
+        else inverted
     )
 
 
 def solve(matrix: Any, right: Any) -> Any:
     """Return the solution (n,) of a system of equations."""
-    found = np.linalg.solve(values(matrix), values(right))
+    solution = np.linalg.solve(values(matrix), values(right))
     if not isinstance(matrix, Dual) and not isinstance(right, Dual):
-        return found
-    left = right - matrix @ found
-    return Dual(found, np.linalg.solve(values(matrix), left.turns))
+        return solution
+    left = right - matrix @ solution
+    return Dual(solution, np.linalg.solve(values(matrix), left.turns))
 
 
 def _scalar(function: Callable[[float], float], slope: Callable[[float], float]) -> Callable[[Any], Any]:

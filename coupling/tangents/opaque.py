@@ -22,70 +22,70 @@ def changed(record: Record, **values: Any) -> Record:
     return made
 
 
-def with_number(record: Any, place: Sequence[str | int], number: Any) -> Any:
-    """Return nested records with a number at a place: names of fields, keys and places in lists."""
-    if not place:
+def with_number(record: Any, keys: Sequence[str | int], number: Any) -> Any:
+    """Return nested records with a number at keys: names of fields, keys and indices of lists."""
+    if not keys:
         return number
-    head, rest = place[0], place[1:]
+    head, rest = keys[0], keys[1:]
     if isinstance(record, Mapping):
         return {**record, head: with_number(record[head], rest, number)}
     if isinstance(record, tuple):
         return (*record[: int(head)], with_number(record[int(head)], rest, number), *record[int(head) + 1 :])
     if not hasattr(record, str(head)):  # keys that other code has added
-        return changed(record, added=with_number(record.added, place, number))
+        return changed(record, added=with_number(record.added, keys, number))
     return changed(record, **{str(head): with_number(getattr(record, str(head)), rest, number)})
 
 
-def _mapped(thing: Any, change: Callable[[Any], Any], wanted: Callable[[Any], bool]) -> Any:
+def _mapped(value: Any, change: Callable[[Any], Any], wanted: Callable[[Any], bool]) -> Any:
     """Return nested records with their wanted parts changed; the same where nothing is."""
-    if wanted(thing):
-        return change(thing)
-    if isinstance(thing, Mapping):
-        made = {key: _mapped(one, change, wanted) for key, one in thing.items()}
-        return thing if all(made[key] is one for key, one in thing.items()) else made
-    if isinstance(thing, tuple | list):
-        parts = [_mapped(one, change, wanted) for one in thing]
-        if all(part is one for part, one in zip(parts, thing, strict=True)):
-            return thing
-        return type(thing)(*parts) if hasattr(thing, "_fields") else type(thing)(parts)
-    if is_dataclass(thing) and not isinstance(thing, type):
-        values = {name: _mapped(one, change, wanted) for name, one in vars(thing).items()}
-        turned = {name: one for name, one in values.items() if one is not vars(thing)[name]}
-        return changed(thing, **turned) if turned else thing
-    return thing
+    if wanted(value):
+        return change(value)
+    if isinstance(value, Mapping):
+        made = {key: _mapped(one, change, wanted) for key, one in value.items()}
+        return value if all(made[key] is one for key, one in value.items()) else made
+    if isinstance(value, tuple | list):
+        parts = [_mapped(one, change, wanted) for one in value]
+        if all(part is one for part, one in zip(parts, value, strict=True)):
+            return value
+        return type(value)(*parts) if hasattr(value, "_fields") else type(value)(parts)
+    if is_dataclass(value) and not isinstance(value, type):
+        values = {name: _mapped(one, change, wanted) for name, one in vars(value).items()}
+        turned = {name: one for name, one in values.items() if one is not vars(value)[name]}
+        return changed(value, **turned) if turned else value
+    return value
 
 
-def plain(thing: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return nested records without derivatives."""
-    return _mapped(thing, lambda one: _number(one.value), _is_dual)
+    return _mapped(value, lambda one: _number(one.value), _is_dual)
 
 
-def _is_dual(thing: Any) -> bool:
-    return isinstance(thing, Dual)
+def _is_dual(value: Any) -> bool:
+    return isinstance(value, Dual)
 
 
 def _number(value: np.ndarray) -> Any:
     return value.item() if value.ndim == 0 else value
 
 
-def _numbers(thing: Any) -> bool:
-    return isinstance(thing, float | complex | Dual) or (
-        isinstance(thing, np.ndarray | np.number) and np.issubdtype(thing.dtype, np.inexact)
+def _numbers(value: Any) -> bool:
+    return isinstance(value, float | complex | Dual) or (
+        isinstance(value, np.ndarray | np.number) and np.issubdtype(value.dtype, np.inexact)
     )
 
 
-def _flat(thing: Any) -> list[np.ndarray]:
+def _flat(value: Any) -> list[np.ndarray]:
     """Return the numbers of nested records, complex ones as pairs."""
-    found: list[np.ndarray] = []
+    leaves: list[np.ndarray] = []
 
     def take(one: Any) -> Any:
         values = np.atleast_1d(np.asarray(one)).ravel()
         reals = values.view(float) if np.iscomplexobj(values) else values.astype(float)
-        found.append(np.where(np.isfinite(reals), reals, 0.0))  # what is infinite stays so
+        leaves.append(np.where(np.isfinite(reals), reals, 0.0))  # infinities stay
         return one
 
-    _mapped(thing, take, _numbers)
-    return found
+    _mapped(value, take, _numbers)
+    return leaves
 
 
 def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False) -> Any:
@@ -93,7 +93,7 @@ def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False)
 
     By differences of high order along each number that turns them; what it returns as it was given has the derivatives
     that it came with. Raises NotSmooth at a kink. unknown: derivatives are nan there, and judged by each number in
-    place of the largest of an array.
+    index of the largest of an array.
     """
     count, turned = dual.active(), list[Dual]()
     if count is None:
@@ -104,12 +104,14 @@ def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False)
         if not turned:
             return function(*arguments)
         given = plain(arguments)
-        found = function(*given)
-        if (same := next((own for own, one in zip(arguments, given, strict=True) if found is one), None)) is not None:
+        result = function(*given)
+        if (
+            same := next((argument for argument, one in zip(arguments, given, strict=True) if result is one), None)
+        ) is not None:
             return same
-        here = _flat(found) if ways else []
+        here = _flat(result) if ways else []
         if not here:
-            return found
+            return result
         flat = np.concatenate(here)
         scale = np.concatenate([np.full(len(one), np.abs(one).max(initial=0.0)) for one in here])
         scale = np.abs(flat) if unknown else scale
@@ -131,7 +133,7 @@ def opaque(function: Callable[..., Any], *arguments: Any, unknown: bool = False)
                     raise
                 turns[:, p] = np.nan
     left = iter(np.split(turns, np.cumsum([len(one) for one in here])[:-1]))
-    return _mapped(found, lambda one: _turned(one, left), _numbers)
+    return _mapped(result, lambda one: _turned(one, left), _numbers)
 
 
 def _turned(one: Any, left: Iterator[np.ndarray]) -> Any:

@@ -2,7 +2,7 @@
 
 Between turning points x_k at times t_k a half cycle has the amplitude |x_k - x_{k+1}|/2 and the frequency
 1/(2 (t_{k+1} - t_k)). Turning points, not zero crossings: under dry friction the centre of the motion jumps with the
-direction, which moves crossings but not the times between turning points. Swings |x_k - x_{k+1}| know no constant
+direction, which moves crossings but not the times between turning points. Swings |x_k - x_{k+1}| contain no constant
 offset; of a linear mode with damping ratio zeta their ratio is exp(-pi zeta/sqrt(1 - zeta^2)), exactly.
 """
 
@@ -49,7 +49,7 @@ class Followed:
 
     @property
     def fastest(self) -> float:
-        """Angular frequency of the fastest mode that the followed coordinate feels, rad/s."""
+        """Angular frequency of the fastest mode in the followed coordinate, rad/s."""
         speed = np.abs(self.wave * self.rate)
         felt = speed > _FELT * speed.max(initial=0.0)
         return float(np.abs(self.rate[felt]).max(initial=0.0))
@@ -80,7 +80,7 @@ class Followed:
 
 
 class TurningPoint(NamedTuple):
-    """A place where a coordinate turns: time (s), the coordinate, energies of all and of the structure (J)."""
+    """A point where a coordinate turns: time (s), the coordinate, energies of all and of the structure (J)."""
 
     time: float
     coordinate: float
@@ -163,20 +163,20 @@ def without_rebounds(points: list[TurningPoint]) -> list[TurningPoint]:
     Rebounds are swings that are all smaller than a tenth of both the swings before and after them. At the end of a
     half cycle its outermost turning point stays, on its way none.
     """
-    kept: list[TurningPoint] = []
+    turning: list[TurningPoint] = []
     for point in points:
-        kept.append(point)
-        swing = np.abs(np.diff([each.coordinate for each in kept[-_MOST_REBOUNDS:]]))
+        turning.append(point)
+        swing = np.abs(np.diff([each.coordinate for each in turning[-_MOST_REBOUNDS:]]))
         large = np.flatnonzero(swing[:-1] >= _REBOUND * swing[-1:])
         first = int(large[-1]) + 1 if len(large) else len(swing)
         rebounds = swing[first:-1]
         if not len(rebounds) or rebounds.max() >= _REBOUND * swing[first - 1]:
             continue
-        begun = len(kept) - 2 - len(rebounds)  # the turning point before the first rebound
-        outer = max if kept[begun].coordinate > kept[begun - 1].coordinate else min
-        stays = [outer(kept[begun:-1], key=lambda each: each.coordinate)] if len(rebounds) % 2 == 0 else []
-        kept[begun:-1] = stays
-    return kept
+        begun = len(turning) - 2 - len(rebounds)  # the turning point before the first rebound
+        outer = max if turning[begun].coordinate > turning[begun - 1].coordinate else min
+        stays = [outer(turning[begun:-1], key=lambda each: each.coordinate)] if len(rebounds) % 2 == 0 else []
+        turning[begun:-1] = stays
+    return turning
 
 
 class HalfCycles(NamedTuple):
@@ -190,7 +190,7 @@ class HalfCycles(NamedTuple):
     frequency: np.ndarray
 
 
-class Cycles(NamedTuple):
+class DampingWindows(NamedTuple):
     """Damping over windows of whole cycles that begin at every turning point but the last ones. Arrays (c,).
 
     time: s, of the window's middle; amplitude: mean of the swings in the window, halved; damping_ratio: by the
@@ -212,7 +212,7 @@ def half_cycles(time: np.ndarray, coordinate: np.ndarray) -> HalfCycles:
 
 def cycles(
     time: np.ndarray, coordinate: np.ndarray, energy: np.ndarray, structure_energy: np.ndarray, count: int = 1
-) -> Cycles:
+) -> DampingWindows:
     """Return the damping over windows of `count` cycles between turning points (k,).
 
     Both estimates are exact for a linear mode. The loss of energy includes all parts: in a window in which bodies
@@ -220,7 +220,7 @@ def cycles(
     """
     half = 2 * count
     if len(time) <= half:
-        return Cycles(*np.zeros((5, 0)))
+        return DampingWindows(*np.zeros((5, 0)))
     swing = np.abs(np.diff(coordinate))
     loss = energy[:-half] - energy[half:]
     with np.errstate(invalid="ignore", divide="ignore"):  # at rest there is none
@@ -229,7 +229,7 @@ def cycles(
         left = np.log1p(-loss / structure_energy[:-half])
         by_energy = damping_ratio(-left / (2 * half))
     total = np.concatenate([[0.0], np.cumsum(swing)])
-    return Cycles(
+    return DampingWindows(
         (time[half:] + time[:-half]) / 2, (total[half:] - total[:-half]) / (2 * half), ratio,
         np.where(np.isfinite(left), by_energy, np.nan), loss,
     )  # fmt: skip
@@ -258,13 +258,20 @@ class Bins(NamedTuple):
 
 def bins(amplitude: np.ndarray, values: np.ndarray, edges: np.ndarray, stride: int = 1) -> Bins:
     """Return bins over the amplitudes (k,) of values (k,), nan left out. edges: (b + 1,), the outer ones open."""
-    place = np.searchsorted(edges[1:-1], amplitude, side="right")
+    bin_ = np.searchsorted(edges[1:-1], amplitude, side="right")
     rows = []
     for k in range(len(edges) - 1):
-        own = values[(place == k) & np.isfinite(values)]
-        apart = own[::stride]
+        members = values[(bin_ == k) & np.isfinite(values)]
+        apart = members[::stride]
         spread = np.nan
         if len(apart) > 1:
             spread = stdtrit(len(apart) - 1, 0.975) * apart.std(ddof=1) / np.sqrt(len(apart))
-        rows.append([len(own), own.mean() if len(own) else np.nan, spread, np.median(own) if len(own) else np.nan])
+        rows.append(
+            [
+                len(members),
+                members.mean() if len(members) else np.nan,
+                spread,
+                np.median(members) if len(members) else np.nan,
+            ]
+        )
     return Bins(edges[:-1], edges[1:], *np.reshape(rows, (-1, 4)).T)

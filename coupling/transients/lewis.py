@@ -36,14 +36,14 @@ def _peak(q: float) -> float:
     grid = np.linspace(0.0, 3.0 / np.sqrt(q), 401)
     top = int(np.argmax(_envelope(q, grid)))
     near = grid[max(top - 1, 0)], grid[min(top + 1, len(grid) - 1)]
-    found = minimize_scalar(lambda tau: -float(_envelope(q, np.array([tau]))[0]), bounds=near, method="bounded")
-    return -float(found.fun)
+    maximum = minimize_scalar(lambda tau: -float(_envelope(q, np.array([tau]))[0]), bounds=near, method="bounded")
+    return -float(maximum.fun)
 
 
 def _envelope(q: float, tau: np.ndarray) -> np.ndarray:
     kappa, shift = np.sqrt(-0.5j * q), -1j / q
     now = kappa * (tau + shift)
     behind = now.real >= 0.0
-    found = np.exp(0.5j * q * tau**2) * np.where(behind, -1.0, 1.0) * wofz(1j * np.where(behind, now, -now))
-    found = found + 2.0 * np.exp(np.where(behind, (kappa * shift) ** 2 - tau, -np.inf))
-    return np.abs(np.sqrt(np.pi) / (2.0 * kappa) * found)
+    wave = np.exp(0.5j * q * tau**2) * np.where(behind, -1.0, 1.0) * wofz(1j * np.where(behind, now, -now))
+    wave = wave + 2.0 * np.exp(np.where(behind, (kappa * shift) ** 2 - tau, -np.inf))
+    return np.abs(np.sqrt(np.pi) / (2.0 * kappa) * wave)

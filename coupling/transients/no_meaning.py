@@ -1,4 +1,4 @@
-"""Which quantities motions that do not repeat lack, by their names, what formulas need, or dimensions, and why."""
+"""Which quantities motions that do not repeat lack, by their names, inputs of formulas, or dimensions, and why."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _NOT_STEADY = {
 
 def _of_stress(by_end: Mapping[str, str], damage: str) -> dict[str, str]:
     """Return why quantities of hot spots are not there, by the ends of their names; damage: why no rate of it is."""
-    found = {one.name: why for one in declared_in(stress) for end, why in by_end.items() if one.name.endswith(end)}
-    return found | {one.name: damage for one in declared_in(stress) if one.unit == "1/h"}
+    reasons = {one.name: why for one in declared_in(stress) for end, why in by_end.items() if one.name.endswith(end)}
+    return reasons | {one.name: damage for one in declared_in(stress) if one.unit == "1/h"}
 
 
 NOT_IN_RAMPS = _NOT_STEADY | {

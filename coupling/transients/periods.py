@@ -12,7 +12,7 @@ import numpy as np
 from vanedamp.coupling.quantities.quantity import Quantity, evaluated, table
 from vanedamp.coupling.quantities.sums import SUMS, sources_of
 from vanedamp.coupling.response.evaluation import Outcome, in_plane_of
-from vanedamp.coupling.response.figures import Measured, measure, measured_of
+from vanedamp.coupling.response.figures import FigureInputs, measure, measured_of
 from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import parts_of
@@ -23,11 +23,11 @@ from vanedamp.files.store import frozen
 
 
 class Periods:
-    """The periods of a motion, taken one after the other.
+    """The periods of a motion, taken in turn.
 
-    without: what quantities may not need; each: samples of a period, of a scene with hot spots. Sums are evaluated for
-    all periods at once, other parts as they come; where contacts yield, once the next period has told how the impacts
-    end that a period leaves open.
+    without: inputs that are missing; each: samples of a period, of a scene with hot spots. Sums are evaluated for
+    all periods at once, other parts as they come; where contacts yield, once the next period has shown how the impacts
+    end that a period does not.
     """
 
     def __init__(self, scene: Scene, without: Mapping[str, str], each: int = 0) -> None:
@@ -37,8 +37,8 @@ class Periods:
         self._rows, self._planes = list[np.ndarray](), list[Mapping[str, np.ndarray]]()
         self._of_parts = dict[Quantity, list[Any]]()
         self._waiting: tuple[Scene, Outcome] | None = None
-        #: what figures need of the system, as long as it is the same but for the excitation's frequency
-        self._measured: Measured | None = None
+        #: what figures need of the system, while it is the same but for the excitation's frequency
+        self._measured: FigureInputs | None = None
         self._J = np.zeros(0)
 
     def add(self, scene: Scene, run: Outcome) -> None:
@@ -73,34 +73,34 @@ class Periods:
                 values.append(one.of(parts))
 
     def stress_of_all(self) -> list[Any] | None:
-        """Return what quantities need of hot spots over all periods, as of a run; None without any."""
+        """Return inputs of quantities of hot spots over all periods, as of a run; None without any."""
         return self._stress.of_spots(whole=True) if self._stress is not None and self._rows else None
 
     def results(self, further: Mapping[str, Any]) -> dict[str, Any]:
-        """Return `quantities` (p, ...) of the periods, `stress` and `strength`; what no period knows is left out.
+        """Return `quantities` (p, ...) of the periods, `stress` and `strength`; unknown ones are left out.
 
-        further: what quantities need besides, (p,) each.
+        further: more inputs of quantities, (p,) each.
         """
         self._finish(None)
         count, rows, of_spots = len(self._rows), np.array(self._rows), dict[str, Any]()
         if not count:
             return {"quantities": {}}
-        # sums are columns, beside which bodies have columns of their own
+        # sums are columns; bodies have theirs
         sources = {name: _columns(value) for name, value in (sources_of(rows) | dict(further)).items()}
         for name in self._planes[0] if self._planes else ():
             sources[name] = np.array([plane[name] for plane in self._planes])
         if self._stress is not None:
             of_spots = {"stress": frozen(self._stress.amplitudes()), "strength": self._stress.strengths}
             sources["stress"] = self._stress.of_spots()
-        found: dict[str, Any] = {
+        series: dict[str, Any] = {
             name: np.moveaxis(value, -1, 0) if "stress" in table()[name].needs else value
             for name, value in evaluated(sources).items()
         } | {one.name: np.array(values, float) for one, values in self._of_parts.items()}
-        known = {name: one for name, one in table().items() if name in found and one.lacking(self._without) is None}
+        known = {name: one for name, one in table().items() if name in series and one.lacking(self._without) is None}
         quantities = {
-            name: frozen(np.reshape(found[name], (count, *([-1] if one.dims else []))))
+            name: frozen(np.reshape(series[name], (count, *([-1] if one.dims else []))))
             for name, one in known.items()
-            if np.isfinite(found[name]).any()
+            if np.isfinite(series[name]).any()
         }
         return {"quantities": quantities, **of_spots}
 
@@ -112,18 +112,18 @@ def _columns(value: Any) -> Any:
 
 
 def _parts(scene: Scene, run: Outcome) -> dict[str, Any]:
-    """Return what quantities need of a run of one period besides its sums."""
-    ledger, found = run.records.ledger, dict[str, Any]()
+    """Return inputs of quantities of a run of one period besides its sums."""
+    ledger, fields = run.records.ledger, dict[str, Any]()
     known = {"transient": 0, "energy": {"friction": float(ledger[1, FRICTION] - ledger[0, FRICTION])}}
     for observer in parts_of(scene):
-        # what is pressed beyond what Hertz' law can tell has no strength
-        found |= {"contacts": None} if observer is CONTACTS else {}
-        found |= observer.fields(scene, run, known)
-    return {name: value for name, value in found.items() if name not in ("warnings", "contact_work")}
+        # beyond Hertz' law there is no strength
+        fields |= {"contacts": None} if observer is CONTACTS else {}
+        fields |= observer.fields(scene, run, known)
+    return {name: value for name, value in fields.items() if name not in ("warnings", "contact_work")}
 
 
 def _ended(run: Outcome, later: Sequence[np.ndarray]) -> Sequence[np.ndarray]:
-    """Return the log of a period with the ends, in the log of the next one, of impacts that it leaves open."""
+    """Return the log of a period with the ends, in the log of the next one, of impacts unfinished in it."""
     last = {int(entry[2]): entry[1] for log in run.log for entry in log if entry[1] in (IMPACT, DETACHES)}
     ends: dict[int, np.ndarray] = {}
     for entry in itertools.chain(*later):
@@ -140,12 +140,12 @@ def single_periods(run: Outcome) -> Iterator[Outcome]:
     edges = np.searchsorted(log[:, 0], span * np.arange(run.periods + 1))
     edges[0], edges[-1] = 0, len(log)
     for k in range(run.periods):
-        own = log[edges[k] : edges[k + 1]].copy()
-        own[:, 0] -= k * span
-        arrays = (part[k : k + 2] if len(part) == len(records.peak) else part for part in records)
+        events = log[edges[k] : edges[k + 1]].copy()
+        events[:, 0] -= k * span
+        arrays = (array[k : k + 2] if len(array) == len(records.peak) else array for array in records)
         own_records = type(records)(*arrays)._replace(coordinates=records.coordinates[k * each : (k + 1) * each])
         plane = run.plane
         if plane is not None:
             cut = {name: getattr(plane, name)[k : k + 1] for name in ("tilt", "lifted", "walls")}
             plane = plane._replace(**cut)
-        yield replace(run, records=own_records, periods=1, log=[own] if len(own) else [], plane=plane)
+        yield replace(run, records=own_records, periods=1, log=[events] if len(events) else [], plane=plane)

@@ -55,7 +55,7 @@ from vanedamp.files.toml_input import InputError
 
 #: fraction of the gap, and of its product with the angular frequency, below which a body counts as at rest
 _AT_REST = 1e-9
-#: fraction of the largest motion of a place by a mode below which it does not feel another
+#: below this fraction of a point's largest motion by a mode, another is negligible
 _UNSEEN = 1e-11
 #: points of the linear curves from end to end, and around their peaks, in half-power widths
 _EVEN, _AROUND = 201, np.linspace(-3.0, 3.0, 25)
@@ -73,15 +73,15 @@ class _Checkpoint(SceneCheckpoint):
         super().__init__(path, "ramp-checkpoint", scene, provenance)
         self._scene, self._provenance = scene, provenance
         self.runs, self.notes = list[RampRun](), list[str]()
-        if (found := self.read()) is not None:
-            kept = Ramp.of(*found, str(path))
-            self.runs, self.notes = list(kept.runs), list(kept.warnings)
+        if (saved := self.read()) is not None:
+            stored = Ramp.of(*saved, str(path))
+            self.runs, self.notes = list(stored.runs), list(stored.warnings)
 
     def content(self) -> tuple[Mapping[str, Variable], dict[str, Any], str]:
         """Return variables and attributes of the file, and how much is finished, in words."""
         nothing = {name: np.zeros(0) for name in CURVES}
-        kept = Ramp(self._scene, tuple(self.runs), nothing, {}, tuple(self.notes), self._provenance)
-        return kept.variables(), kept.attributes(), f"{len(self.runs)} runs are finished"
+        stored = Ramp(self._scene, tuple(self.runs), nothing, {}, tuple(self.notes), self._provenance)
+        return stored.variables(), stored.attributes(), f"{len(self.runs)} runs are finished"
 
 
 def ramp(
@@ -92,7 +92,7 @@ def ramp(
 ) -> Ramp:
     """Run a scene up or down, or both, at all rates of its [ramp] table.
 
-    progress: called with the number of periods done and of those to do, of all runs; checkpoint: a file to which
+    progress: called with periods done and to do, of all runs; checkpoint: a file to which
     finished runs are written and from which an interrupted call resumes; the caller removes it once the result is safe
     (files.checkpoint_file.clear).
     Raises InputError for a scene without the table, or one that cannot be run so; numerical failure is a status of the
@@ -106,8 +106,8 @@ def ramp(
     total, before = sum(len(course.time) for course in planned), 0
     spots = hot_spots_in_file(scene.structure)
     data = dict(provenance or {}) | ({"hot_spots": spots} if spots else {})
-    with _Checkpoint(checkpoint, scene, data) as kept:
-        runs, notes = kept.runs, kept.notes
+    with _Checkpoint(checkpoint, scene, data) as saved:
+        runs, notes = saved.runs, saved.notes
         for number, course in enumerate(planned):
             chosen = with_choices(scene_at(base, table, float(course.value[0])), choices)
             first, start = chosen.scene, chosen.start
@@ -124,7 +124,7 @@ def ramp(
                 if progress is not None:
                     progress(before - len(course.time) + done, total)
             runs.append(run.result())
-            kept.changed()
+            saved.changed()
     curves, tops = _stationary(first, table)
     return Ramp(scene, tuple(runs), curves, tops, tuple(dict.fromkeys(notes)), data)
 
@@ -141,7 +141,7 @@ def _steady(scene: Scene, start: RestartState | None) -> tuple[RestartState, lis
 
 
 def seen_only(system: System) -> System:
-    """Return a system without the loads on modes that neither the response nor a body nor a contact feels.
+    """Return a system without the loads on modes that that move neither response nor contacts.
 
     The engine lets such modes be: it carries no free motion of them from one period to the next. At rest they have no
     energy either, and the energies include all moving parts.
@@ -151,8 +151,8 @@ def seen_only(system: System) -> System:
         system.of_structure.response, system.floor[:, :n], system.casing[:, :n], system.of_structure.J
     ]))  # fmt: skip
     felt = (rows / np.maximum(rows.max(axis=1, initial=0.0), np.finfo(float).tiny)[:, None]).max(axis=0, initial=0.0)
-    own = system.of_structure.damping - np.diag(np.diag(system.of_structure.damping))
-    unseen = np.flatnonzero((felt < _UNSEEN) & ~own.any(axis=0))
+    coupling = system.of_structure.damping - np.diag(np.diag(system.of_structure.damping))
+    unseen = np.flatnonzero((felt < _UNSEEN) & ~coupling.any(axis=0))
     if not system.load[:, unseen].any():
         return system
     load = system.load.copy()

@@ -1,4 +1,4 @@
-"""The periods of a run-up or run-down, and the scene in each of them.
+"""The periods of a run-up or run-down, and the scene in each.
 
 Within a period of the excitation frequency and speed are constant, the means of the ramp over the period: so it takes
 as long as a period of the chirp, a force whose frequency changes all the time, and both have whole phases at the same

@@ -13,7 +13,7 @@ import numpy as np
 from vanedamp.coupling.quantities.amplitude import amplitude_max, amplitude_max_dynamic
 from vanedamp.coupling.quantities.energy import energy_residual
 from vanedamp.coupling.quantities.impacts import impacts_per_period
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
+from vanedamp.coupling.quantities.quantity import Quantity, QuantityRecord, labels_along, table
 from vanedamp.coupling.quantities.stress import MEASURES
 from vanedamp.coupling.quantities.sums import ENERGIES
 from vanedamp.coupling.response.scene_record import SceneField
@@ -48,7 +48,7 @@ CURVES = {"frequency": "Hz", "speed": "rad/s", "undamped": "m", "fixed": "m"}
 
 
 @dataclass(frozen=True, eq=False)
-class RampRun(Measured):
+class RampRun(QuantityRecord):
     """A run through p excitation periods with b bodies.
 
     rate             change of the ramp's quantity per second, below zero where it falls
@@ -63,7 +63,7 @@ class RampRun(Measured):
                      without any
     strength         utilisation and damage of the run, by hot spot (strength.assessment); those without data left out
     quantities       (p, ...) of each period, by name, attributes as well (results.md), such as `amplitude_rms`
-                     or `wear_volume_rate`; what no period knows is left out
+                     or `wear_volume_rate`; unknown ones are left out
     amplitude, amplitude_dynamic, impacts  (p,) those of NAMED by their names in files
     """
 
@@ -95,7 +95,7 @@ class RampRun(Measured):
 
     @property
     def mean(self) -> dict[str, Any]:
-        """Mean of each quantity over the time of the run, by name: of rates, what the run comes to per time."""
+        """Mean of each quantity over the time of the run, by name: of rates, the run's total per time."""
         return {one.name: self._mean(self.quantities[one.name]) for one in self._ordered}
 
     def _mean(self, values: np.ndarray) -> Any:
@@ -107,7 +107,7 @@ class RampRun(Measured):
 
     @property
     def limits(self) -> list[tuple[Quantity, float, float]]:
-        """What is limited, such as wear, with its largest value in a period and its mean; stress is in `strength`."""
+        """Limited quantities, such as wear, with largest value in a period and mean; stress is in `strength`."""
         largest, mean = self.largest, self.mean
         known = (one for name, one in table().items() if name in largest)
         return [(one, float(largest[one.name]), float(mean[one.name])) for one in known if one.limited and not one.dims]
@@ -148,10 +148,10 @@ class RampRun(Measured):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ramp(Measured, Record, Plotted):
+class Ramp(QuantityRecord, Record, Plotted):
     """Run-ups and run-downs of a scene with a [ramp] table.
 
-    Quantities of the periods are attributes, all runs one after the other.
+    Quantities of the periods are attributes, all runs in turn.
     """
 
     KIND: ClassVar[str] = "ramp"
@@ -177,8 +177,8 @@ class Ramp(Measured, Record, Plotted):
     @cached_property
     def quantities(self) -> dict[str, np.ndarray]:  # type: ignore[override]
         """Quantities of all periods (results.md), run by run, nan where a run knows none."""
-        found = joined([run.quantities for run in self.runs], [len(run.time) for run in self.runs])
-        return {name: frozen(values) for name, values in found.items()}
+        quantities = joined([run.quantities for run in self.runs], [len(run.time) for run in self.runs])
+        return {name: frozen(values) for name, values in quantities.items()}
 
     @property
     def table(self) -> Table:
@@ -225,15 +225,15 @@ class Ramp(Measured, Record, Plotted):
 
     def strength(self, run: RampRun) -> dict[str, dict[str, Any]]:
         """Return the strength of a run by hot spot, with the life in starts that pass the ramp `table.passes` times."""
-        found = {spot: dict(values) for spot, values in run.strength.items()}
-        for values in found.values():
+        strength = {spot: dict(values) for spot, values in run.strength.items()}
+        for values in strength.values():
             if "life_repeats" in values:
                 passes = self.table.passes
                 values["life_starts"] = {name: life / passes for name, life in values["life_repeats"].items()}
-        return found
+        return strength
 
     def variables(self) -> dict[str, Variable]:
-        """Return the variables of a file: the periods of all runs one after the other, runs, and linear curves."""
+        """Return the variables of a file: the periods of all runs in turn, runs, and linear curves."""
         runs, dampers = self.runs, len(self.scene.damper)
 
         def series(name: str) -> np.ndarray:
@@ -245,7 +245,7 @@ class Ramp(Measured, Record, Plotted):
             NAMED.get(name, name): Variable(values, ("period", *table()[name].dims), table()[name].unit)
             for name, values in self.quantities.items()
         }
-        found = {
+        variables = {
             "run_of_period": Variable(np.repeat(np.arange(len(runs)), periods), ("period",)),
             **{name: Variable(series(name), ("period",), units) for name, units in SERIES.items()},
             **measured,
@@ -261,12 +261,12 @@ class Ramp(Measured, Record, Plotted):
             spots, dims = list(self.provenance["hot_spots"]), ("period", "hot_spot", "stress_measure")
             none = np.zeros((0, len(spots), len(MEASURES)))
             stress = np.concatenate([none if run.stress is None else run.stress for run in runs])
-            found |= stress_axes(spots) | {"stress": Variable(stress, dims, "Pa")}
-        own = labels_along(self.quantities).items()
-        found |= {dim: Variable(np.array(names, object), (dim,)) for dim, names in own}
+            variables |= stress_axes(spots) | {"stress": Variable(stress, dims, "Pa")}
+        axes = labels_along(self.quantities).items()
+        variables |= {dim: Variable(np.array(names, object), (dim,)) for dim, names in axes}
         if dampers:
-            found["stuck"] = Variable(series("stuck").astype(np.int8), ("period", "damper"))
-        return found
+            variables["stuck"] = Variable(series("stuck").astype(np.int8), ("period", "damper"))
+        return variables
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a file."""
@@ -308,6 +308,6 @@ class Ramp(Measured, Record, Plotted):
         return super().to_xarray().assign_attrs(quantity=self.table.quantity)
 
 
-def _plain(found: Mapping[str, Any]) -> dict[str, Any]:
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return quantities as plain data."""
-    return {name: np.asarray(value, float).tolist() for name, value in found.items()}
+    return {name: np.asarray(value, float).tolist() for name, value in values.items()}

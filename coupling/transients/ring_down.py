@@ -55,13 +55,11 @@ _NO_MOTION: dict[str, Any] = {
 
 
 def ring_down(
-    scene: Scene,
-    progress: Callable[[int, int], None] | None = None,
-    provenance: Mapping[str, Any] | None = None,
+    scene: Scene, progress: Callable[[int, int], None] | None = None, provenance: Mapping[str, Any] | None = None
 ) -> RingDown:
     """Let a scene ring down as its [ring_down] table says, and find the turning points of one natural mode.
 
-    progress: called with the number of periods done and of those to do. Raises InputError for a scene without the
+    progress: called with periods done and to do. Raises InputError for a scene without the
     table, one that the exact engine cannot run, or in which nothing moves; numerical failure is a status of the result.
     """
     began, table = time.perf_counter(), table_of(scene)
@@ -133,7 +131,7 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
 
 
 def _linear(system: System, mode: int) -> LinearMode:
-    """Return the results of a mode without bodies, and with all of them fixed: of the mode that is most like it."""
+    """Return the results of a mode without bodies, and with all fixed: of the mode that is most like it."""
     modes = system.of_structure
     squares, shapes = eigh(np.diag(modes.stiffness), fixed_mass(system))
     like = int(np.argmax(np.abs(shapes[mode])))
@@ -151,8 +149,8 @@ def _free_motion(
     began, periods = time.perf_counter(), free.time.simulated
     options: Any = free.solver
     spots, parts = spots_of(free), parts_of(free)
-    own = np.sqrt(system.of_structure.stiffness[mode]) / system.omega
-    each = 0 if spots is None else max(samples_of(free, system, spots), OF_HARMONIC * math.ceil(own))
+    ratio = np.sqrt(system.of_structure.stiffness[mode]) / system.omega
+    each = 0 if spots is None else max(samples_of(free, system, spots), OF_HARMONIC * math.ceil(ratio))
     exponent = together(one.needs for one in parts).exponent
     records = new_records(system, periods, each, spots is not None, deflects(free, system), exponent, outputs=True)
     begun = start_of(free, system, start)
@@ -186,8 +184,8 @@ def _free_motion(
 
 def _measured(response: Response) -> dict[str, Any]:
     """Return the quantities of the whole motion that have a meaning for it, and that are known."""
-    found = {
+    values = {
         name: getattr(response, name) for name, one in quantities().items() if one.lacking(NOT_IN_RING_DOWNS) is None
     }
-    known = {name: np.asarray(value, float) for name, value in found.items() if value is not None}
+    known = {name: np.asarray(value, float) for name, value in values.items() if value is not None}
     return {name: frozen(value)[()] for name, value in known.items() if np.isfinite(value).any()}

@@ -9,12 +9,12 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.quantities.quantity import Measured, Quantity, labels_along, table
+from vanedamp.coupling.quantities.quantity import Quantity, QuantityRecord, labels_along, table
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.scene_record import SceneField
 from vanedamp.coupling.response.spot_stress import scalars, stress_axes
 from vanedamp.coupling.scene.ring_down import RingDownTable
-from vanedamp.coupling.transients.instantaneous import Bins, Cycles, HalfCycles, bins, cycles, half_cycles
+from vanedamp.coupling.transients.instantaneous import Bins, DampingWindows, HalfCycles, bins, cycles, half_cycles
 from vanedamp.files.display import Plotted
 from vanedamp.files.record import Array, NamedArrays, Record
 from vanedamp.files.store import Variable
@@ -33,7 +33,7 @@ UNITS = {
 class LinearMode:
     """The followed natural mode: its number from 0, frequency (Hz, undamped) and damping ratio without bodies.
 
-    fixed_frequency, fixed_damping_ratio: with every body fixed in its cavity.
+    fixed_frequency, fixed_damping_ratio: with bodies fixed.
     """
 
     mode: int
@@ -44,7 +44,7 @@ class LinearMode:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RingDown(Measured, Record, Plotted):
+class RingDown(QuantityRecord, Record, Plotted):
     """The free motion of one natural mode, by its k turning points; in JSON, names have units.
 
     Quantities of the whole motion are attributes (docs/reference/results.md).
@@ -113,7 +113,7 @@ class RingDown(Measured, Record, Plotted):
         return half_cycles(self.time, self.displacement)
 
     @cached_property
-    def cycles(self) -> Cycles:
+    def cycles(self) -> DampingWindows:
         """Amplitude (m) and damping of windows of `table.cycles` cycles."""
         return cycles(self.time, self.displacement, self.energy, self.structure_energy, self.table.cycles)
 
@@ -163,11 +163,11 @@ class RingDown(Measured, Record, Plotted):
         }  # fmt: skip
         if self.stress is not None:
             spots = self.provenance["hot_spots"]
-            data["stress_pa"] = {spot: scalars(self.stress[:, place]) for place, spot in enumerate(spots)}
+            data["stress_pa"] = {spot: scalars(self.stress[:, index]) for index, spot in enumerate(spots)}
         if self.quantities:
             data["quantities"] = {name: np.asarray(value).tolist() for name, value in self.quantities.items()}
         if self.table.bins:
-            data["bins"] = _with_units({name: _of_bins(found) for name, found in self.bins.items()})
+            data["bins"] = _with_units({name: _of_bins(each) for name, each in self.bins.items()})
         if self.strength:
             data["strength"] = {spot: dict(values) for spot, values in self.strength.items()}
         for name in ("estimate", "advice"):
@@ -177,35 +177,35 @@ class RingDown(Measured, Record, Plotted):
 
     def variables(self) -> dict[str, Variable]:
         """Return the variables of a file: turning points, half cycles, windows of cycles, and bins if there are any."""
-        found = super().variables()
+        variables = super().variables()
         for dim, swings in (("half_cycle", self.half_cycles), ("cycle", self.cycles)):
             for name, values in _named(swings).items():
                 named = f"{dim}_{name}" if name in ("time", "amplitude") else name
-                found[named] = Variable(values, (dim,), UNITS.get(name, "1"))
+                variables[named] = Variable(values, (dim,), UNITS.get(name, "1"))
         if self.stress is not None:
-            found |= stress_axes(list(self.provenance["hot_spots"]))
+            variables |= stress_axes(list(self.provenance["hot_spots"]))
         if self.stress is not None or self.course:
             count = len(next(iter(self.course.values())) if self.stress is None else self.stress)
-            found["period_time"] = Variable(np.arange(count) / self.scene.frequency, ("period",), "s")
+            variables["period_time"] = Variable(np.arange(count) / self.scene.frequency, ("period",), "s")
         if self.table.bins:
             for name, each in self.bins.items():
                 units = {"low": "m", "high": "m", "number": "1"}
-                for part, values in each._asdict().items():
-                    unit = units.get(part, UNITS.get(name, "1"))
-                    found[f"{name}_{part}"] = Variable(values, ("bin",), unit)
-        return found
+                for column, values in each._asdict().items():
+                    unit = units.get(column, UNITS.get(name, "1"))
+                    variables[f"{name}_{column}"] = Variable(values, ("bin",), unit)
+        return variables
 
 
-def _of_bins(found: Bins) -> dict[str, list[float]]:
+def _of_bins(of_bins: Bins) -> dict[str, list[float]]:
     names = {"low": "amplitude_low_m", "high": "amplitude_high_m"}
-    return {names.get(part, part): values.tolist() for part, values in found._asdict().items()}
+    return {names.get(column, column): values.tolist() for column, values in of_bins._asdict().items()}
 
 
-def _named(part: HalfCycles | Cycles) -> dict[str, Any]:
-    return {"energy_loss" if name == "loss" else name: values for name, values in part._asdict().items()}
+def _named(record: HalfCycles | DampingWindows) -> dict[str, Any]:
+    return {"energy_loss" if name == "loss" else name: values for name, values in record._asdict().items()}
 
 
-def _with_units(found: Mapping[str, Any]) -> dict[str, Any]:
+def _with_units(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return results as plain data by names with their units."""
-    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
+    plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
     return {f"{name}_{UNITS[name].lower()}" if name in UNITS else name: value for name, value in plain.items()}

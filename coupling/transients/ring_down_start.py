@@ -79,7 +79,7 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
     with their bodies, and leaves the springs of friction dampers unloaded. Numbers of the scene may have derivatives.
     Raises InputError.
     """
-    system, kept = assemble(scene), frozen if active() is None else array
+    system, convert = assemble(scene), frozen if active() is None else array
     state, scale = start_of(scene, system), system.scale
     if table.impulse is None and table.displacement is None:
         return state
@@ -92,7 +92,7 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
         p = softness * (table.displacement / (row @ softness))
         if active() is None:
             _check_stops(system, p, table.displacement)
-        return changed(state, displacement=kept(state.displacement + scale * p))
+        return changed(state, displacement=convert(state.displacement + scale * p))
     rate = row * (table.impulse or 0.0)
     n = system.modes
     slip = state.slip_velocity - system.floor[:, :n] @ rate
@@ -101,7 +101,7 @@ def blown_or_pulled(scene: Scene, table: RingDownTable) -> RestartState:
         extended = system.tilt >= 0
         moved["lift_velocity"] = state.lift_velocity - np.where(extended, system.rise[:, :n] @ rate, 0.0)
         moved["tilt_rate"] = state.tilt_rate - np.where(extended, system.turn[:, :n] @ rate, 0.0)
-    return changed(state, **{name: kept(rates) for name, rates in moved.items()})
+    return changed(state, **{name: convert(rates) for name, rates in moved.items()})
 
 
 def _check_stops(system: System, p: np.ndarray, displacement: float) -> None:

@@ -197,7 +197,7 @@ def expected(one: Confirmation) -> float:
 
 def estimated(devices: Devices) -> float:
     """Return the time of searches, confirmations and life, s, by a trial of their runs."""
-    from vanedamp.studies.commands.support.trial import mean_cost
+    from vanedamp.studies.jobs.trial import mean_cost
     from vanedamp.studies.jobs.workers import available_cores
 
     effort, points, total = devices.study.effort, len(devices.frequencies), 0.0

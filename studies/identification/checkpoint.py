@@ -16,7 +16,7 @@ from vanedamp.files.store import Variable
 from vanedamp.studies.identification.study import IdentificationStudy
 
 
-class Part(NamedTuple):
+class FinishedPart(NamedTuple):
     """A part that has ended: its result as plain data, its engine runs, and its time, s."""
 
     result: Any
@@ -24,19 +24,19 @@ class Part(NamedTuple):
     seconds: float
 
 
-class Checkpoint(SceneCheckpoint):
+class SearchCheckpoint(SceneCheckpoint):
     """Parts that have ended, by their numbers, in memory and in a file (path None: in memory only)."""
 
     def __init__(self, path: str | Path | None, study: IdentificationStudy, provenance: Mapping[str, Any]) -> None:
         """Take up the file's parts. Raises InputError for a file of another study, or one that cannot be read."""
         super().__init__(path, "identify-checkpoint", study.scene, provenance, {"study": ("study", _told(study))})
-        self.parts: dict[int, Part] = {}
+        self.parts: dict[int, FinishedPart] = {}
         if (found := self.read()) is not None:
             for number, text in zip(found[0]["number"].tolist(), found[0]["part"], strict=True):
                 result, counts, seconds = json.loads(text)
-                self.parts[number] = Part(result, Counter(counts), seconds)
+                self.parts[number] = FinishedPart(result, Counter(counts), seconds)
 
-    def add(self, number: int, part: Part) -> None:
+    def add(self, number: int, part: FinishedPart) -> None:
         """Keep a part. Raises StoreError, such as for a full disk."""
         self.parts[number] = part
         self.changed()

@@ -21,7 +21,7 @@ from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.sweep.worker import SweepError
 from vanedamp.files.store import frozen
 from vanedamp.studies.forecast import Forecast
-from vanedamp.studies.identification.checkpoint import Checkpoint, Part
+from vanedamp.studies.identification.checkpoint import FinishedPart, SearchCheckpoint
 from vanedamp.studies.identification.data import forced
 from vanedamp.studies.identification.fit import Fit, Minimum, OutOfTime
 from vanedamp.studies.identification.forced import Forced
@@ -79,7 +79,7 @@ def identify(
     """
     began = time.perf_counter()
     study = study if isinstance(study, IdentificationStudy) else IdentificationStudy.load(study)
-    with Checkpoint(checkpoint, study, provenance or {}) as kept:
+    with SearchCheckpoint(checkpoint, study, provenance or {}) as kept:
         work = _Work(study, executor, progress, kept, study.search.budget if budget is None else budget)
         with stage("candidates"):
             starts = work.starts()
@@ -102,7 +102,7 @@ class _Work:
 
     def __init__(
         self, study: IdentificationStudy, executor: Executor | None, progress: Callable[[int, int], None] | None,
-        kept: Checkpoint, budget: float | None,
+        kept: SearchCheckpoint, budget: float | None,
     ) -> None:  # fmt: skip
         self.study, self.count, self.over = study, Counter[str](), ""
         self.fit = Fit(study)
@@ -120,7 +120,7 @@ class _Work:
         }  # fmt: skip
         self._forecast = Forecast(progress, parts)
 
-    def _each(self, kind: str, function: Callable[..., Part], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+    def _each(self, kind: str, function: Callable[..., FinishedPart], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
         """Return the results of calls in order, None of those that the budget has cut, and count their engine runs.
 
         Those kept are not called.
@@ -129,7 +129,7 @@ class _Work:
         self._forecast.expect(kind, len(calls))
         results: list[Any] = [None] * len(calls)
 
-        def take(place: int, part: Part, kept: bool = False) -> None:
+        def take(place: int, part: FinishedPart, kept: bool = False) -> None:
             results[place] = part.result
             self.count += part.counts
             self._forecast.ended(kind, part.seconds, kept)
@@ -242,8 +242,8 @@ def candidates(study: IdentificationStudy) -> np.ndarray:
 
 
 def _called(
-    executor: Executor | None, function: Callable[..., Part], calls: Mapping[int, tuple[Any, ...]], until: float
-) -> Iterator[tuple[int, Part]]:
+    executor: Executor | None, function: Callable[..., FinishedPart], calls: Mapping[int, tuple[Any, ...]], until: float
+) -> Iterator[tuple[int, FinishedPart]]:
     """Yield the parts of calls as they end, with their places, but for those that the time has cut."""
     if executor is None:
         for place, call in calls.items():
@@ -252,7 +252,7 @@ def _called(
             with suppress(OutOfTime):
                 yield place, function(*call)
         return
-    futures = dict[Future[Part], int]()
+    futures = dict[Future[FinishedPart], int]()
     try:
         if time.monotonic() <= until:
             futures = {executor.submit(function, *call): place for place, call in calls.items()}
@@ -269,14 +269,14 @@ def _called(
             future.cancel()
 
 
-def _part(work: Callable[..., tuple[Any, Counter[str]]]) -> Callable[..., Part]:
+def _part(work: Callable[..., tuple[Any, Counter[str]]]) -> Callable[..., FinishedPart]:
     """Return a function of a worker that returns its part, of the result as plain data and the counts of another."""
 
     @wraps(work)
-    def timed(*arguments: Any) -> Part:
+    def timed(*arguments: Any) -> FinishedPart:
         began = time.perf_counter()
         result, count = work(*arguments)
-        return Part(result, count, time.perf_counter() - began)
+        return FinishedPart(result, count, time.perf_counter() - began)
 
     return timed
 

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeGuard
 import numpy as np
 
 from vanedamp.coupling.orbits import newton
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
+from vanedamp.coupling.orbits.newton import OrbitStatus, PeriodicOrbit
 from vanedamp.coupling.orbits.orbits import map_along
 from vanedamp.coupling.orbits.period_map import PeriodMap
 from vanedamp.coupling.response.evaluation import periods_of
@@ -31,7 +31,7 @@ class Steady(NamedTuple):
     """A steady motion of a scene with some numbers, by their paths: an orbit, or else what a run has."""
 
     numbers: Mapping[str, float]
-    orbit: Orbit | None
+    orbit: PeriodicOrbit | None
     response: Ran | Response | None
 
     @property
@@ -65,7 +65,7 @@ class Follower:
         """Let runs begin with the last motion from now on, if it repeats."""
         self.leader = self.motion if self.motion is not None and self.motion.repeats else None
 
-    def orbit(self) -> Orbit | None:
+    def orbit(self) -> PeriodicOrbit | None:
         """Return the last motion as an orbit, which leads; None where it is none."""
         self.motion = settled(self._runs, self.motion, self._count)
         self.lead()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.sweep.checkpoint import Checkpoint
+from vanedamp.coupling.sweep.checkpoint import SweepCheckpoint
 from vanedamp.coupling.sweep.grid import Grid, Points
 
 if TYPE_CHECKING:  # loads the ensembles, which a sweep does not use
@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # loads the ensembles, which a sweep does not use
 
 def finished(checkpoint: Path | None, scene: Scene, count: int, provenance: Mapping[str, Any]) -> int:
     """Return how many of `count` points a checkpoint has. Raises InputError for that of another sweep."""
-    return Checkpoint(checkpoint, scene, count, provenance).finished.count
+    return SweepCheckpoint(checkpoint, scene, count, provenance).finished.count
 
 
 def ends_of(points: Grid | Members) -> list[Scene]:

@@ -24,7 +24,7 @@ from vanedamp.studies.optimisation.study import Study
 _COLUMNS = 4
 
 
-class Checkpoint(SceneCheckpoint):
+class DesignCheckpoint(SceneCheckpoint):
     """Runs that were asked for so far, in memory and in a file (path None: in memory only).
 
     Each has what it counts by (measures.counted) and whether its status is ok, as a last column.

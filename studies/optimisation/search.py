@@ -24,7 +24,7 @@ from vanedamp.files.toml_input import tables
 from vanedamp.studies.band import drive
 from vanedamp.studies.headline import Headline, headline
 from vanedamp.studies.numbers import Box
-from vanedamp.studies.optimisation.checkpoint import Checkpoint
+from vanedamp.studies.optimisation.checkpoint import DesignCheckpoint
 from vanedamp.studies.optimisation.gradient import descend
 from vanedamp.studies.optimisation.measures import SERVICE
 from vanedamp.studies.optimisation.record import Optimisation, Optimum
@@ -52,7 +52,7 @@ def optimise(
     written and from which an interrupted search resumes; the caller removes it once the result is safe
     (files.checkpoint_file.clear).
     """
-    with Checkpoint(checkpoint, study, provenance or {}) as kept:
+    with DesignCheckpoint(checkpoint, study, provenance or {}) as kept:
         return _optimised(study, _Trial(study, executor, progress, deviations(study), kept), dict(provenance or {}))
 
 
@@ -140,7 +140,7 @@ class _Trial:
         executor: Executor | None,
         progress: Callable[[int, int], None] | None,
         sample: Sequence[_Deviation],
-        kept: Checkpoint,
+        kept: DesignCheckpoint,
     ) -> None:
         self.study, self.sample = study, sample
         self.history: list[tuple[Design, float, bool]] = []

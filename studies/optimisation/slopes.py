@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.orbits.newton import PeriodicOrbit
 from vanedamp.coupling.orbits.orbits import find_orbit, settled_orbit
 from vanedamp.coupling.response.static_deflection import deflects
 from vanedamp.coupling.scene.orbit import Orbit as OrbitTable
@@ -29,7 +29,7 @@ class Slope(NamedTuple):
 
     amplitude: float
     by_number: np.ndarray
-    orbit: Orbit
+    orbit: PeriodicOrbit
     moves: np.ndarray
 
     def agrees(self, amplitude: float) -> bool:
@@ -73,7 +73,7 @@ def steady_slope(scene: Scene, paths: Sequence[str], measure: str, amplitude: fl
     return _NOT_PERIODIC if isinstance(found, Slope) and not found.agrees(amplitude) else found
 
 
-def slope_of(orbit: Orbit, paths: Sequence[str], measure: str, some: bool) -> Slope | str:
+def slope_of(orbit: PeriodicOrbit, paths: Sequence[str], measure: str, some: bool) -> Slope | str:
     """Return the slope of an orbit, or the status of its derivatives."""
     found = sensitivity(orbit, paths)
     if found.status is not SensitivityStatus.OK:

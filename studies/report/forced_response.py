@@ -12,7 +12,7 @@ import numpy as np
 
 from vanedamp.coupling.quantities.impacts import attached_mass_fraction, impacts_per_period
 from vanedamp.coupling.quantities.in_plane import wall_impacts
-from vanedamp.coupling.quantities.quantity import Measured, table
+from vanedamp.coupling.quantities.quantity import QuantityRecord, table
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
 from vanedamp.coupling.sweep.designs import amplitude_known, is_choice
@@ -41,7 +41,7 @@ class LinearCurves(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ForcedResponse(Measured):
+class ForcedResponse(QuantityRecord):
     """Curves along an axis of a sweep, each of shape (n,); displacements in m, nan where a point is not ok.
 
     reference          divisor of amplitudes in charts: the maximum without bodies over the range

@@ -25,7 +25,7 @@ from vanedamp.studies.optimisation.study import Study
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     # `check` tries the cost of runs, of which nothing here depends
-    monkeypatch.setattr("vanedamp.studies.commands.support.trial._SECONDS", 0.2)
+    monkeypatch.setattr("vanedamp.studies.jobs.trial._SECONDS", 0.2)
     return tmp_path
 
 

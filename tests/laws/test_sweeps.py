@@ -22,7 +22,7 @@ from vanedamp.coupling.methods.registry import run_of
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import simulate
-from vanedamp.coupling.sweep.alike import Kind
+from vanedamp.coupling.sweep.alike import SceneBatch
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.files.toml_input import validate
 
@@ -84,7 +84,7 @@ def test_a_wide_sweep_is_single_runs(workers):
 def test_what_is_kept_shares_no_memory_with_a_record(seed):
     """Compiled code writes the numbers of a scene into what the kept run owns; records stay as they were."""
     drawn = next(one for one in map(random_sweep, itertools.count(seed)) if columned(one.scene, one.points[0]))
-    kind = Kind(drawn.scene)
+    kind = SceneBatch(drawn.scene)
     records = [kind.scene, kind.run.whole, kind.start, kind.linear]
     run = kind.run
     written = [run.system, *kind.statistics, run.state, run.flows, run.scratch, run.records, run.known.stack]

@@ -34,7 +34,7 @@ from vanedamp.coupling.numerics.codes import (
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import state_at
-from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.assembly import Coordinates
 from vanedamp.coupling.system.system import System
 
 DIGITS, STEP = 40, mp.mpf(10) ** -16
@@ -57,7 +57,7 @@ class Step(NamedTuple):
 def walk(system: System, z: np.ndarray) -> list[Step]:
     """Return the steps of one period that begins with z = (q, q'), as the engine takes them."""
     u = len(system.rest)
-    run = PlanarRun(system, state_at(system, Motion(*np.split(z, 2))), new_records(system, 1, 0), True, 0)
+    run = PlanarRun(system, state_at(system, Coordinates(*np.split(z, 2))), new_records(system, 1, 0), True, 0)
     assert run.advance_to(1) is Status.EVENT_BUDGET
     steps, counters = [], run.state.counters
     while counters[PERIOD] == 0:

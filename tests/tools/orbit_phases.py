@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import vanedamp as vd
 from tests.tools.sensitive_scenes import scene_of
-from vanedamp.coupling.orbits.newton import Orbit
+from vanedamp.coupling.orbits.newton import PeriodicOrbit
 from vanedamp.coupling.response.evaluation import periods_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.orbit import Orbit as Table
@@ -37,7 +37,7 @@ class Judged(NamedTuple):
     sensitivity: str
 
 
-def later(scene: Scene, orbit: Orbit, phase: float) -> tuple[Scene, RestartState]:
+def later(scene: Scene, orbit: PeriodicOrbit, phase: float) -> tuple[Scene, RestartState]:
     """Return a scene of sines that begin at a phase of its own, in degrees, and the orbit's state then."""
     sines = [
         {"order": sine.order, "amplitude": sine.amplitude, "phase": sine.phase} for sine in scene.excitation.harmonic

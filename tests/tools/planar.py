@@ -9,7 +9,7 @@ from vanedamp.coupling.methods import moreau
 from vanedamp.coupling.response.records import WIDTH, new_records
 from vanedamp.coupling.response.restart import motion_of, start_of
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.assembly import Motion, assemble
+from vanedamp.coupling.system.assembly import Coordinates, assemble
 from vanedamp.files.toml_input import validate
 
 
@@ -40,7 +40,7 @@ def planar_scene(data, *bodies, periods=1, gap=1.0, play=1.0):
     return validate(Scene, data | {"cavity": cavity, "damper": dampers, "time": time}, "scene")
 
 
-def initial_motion(scene, system) -> Motion:
+def initial_motion(scene, system) -> Coordinates:
     """Coordinates and velocities with which a scene begins."""
     return motion_of(system, start_of(scene, system))
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from tests.tools.differences import MOST_EVENTS, Difference, by_numbers
 from tests.tools.sensitive_scenes import KINDS, numbers_of, scene_of
-from vanedamp.coupling.orbits.newton import Orbit, OrbitStatus
+from vanedamp.coupling.orbits.newton import OrbitStatus, PeriodicOrbit
 from vanedamp.coupling.orbits.orbits import find_orbit
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.quantities.quantity import table as quantities
@@ -128,7 +128,7 @@ def _at_rest(scene: Scene) -> Scene:
     return scene.replace(values)
 
 
-def _checked(kind: str, subject: str, scene: Scene, given: Orbit | Scene, periods: int) -> Checked:
+def _checked(kind: str, subject: str, scene: Scene, given: PeriodicOrbit | Scene, periods: int) -> Checked:
     """Compare the derivatives as all numbers change, each by some of its size; one by one if that does not do."""
     numbers = numbers_of(scene, subject == "run")
     found = sensitivity(given, list(numbers))

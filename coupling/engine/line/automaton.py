@@ -21,7 +21,7 @@ from vanedamp.coupling.engine.line.contact_states import (
     row_terms,
     stop_attached_bodies,
 )
-from vanedamp.coupling.engine.line.energy_balance import account, account_impact, account_spell, account_step
+from vanedamp.coupling.engine.line.energy_balance import add_interval, end_segment, subtract_impact, subtract_step
 from vanedamp.coupling.engine.line.event_functions import ENDLESS, carry_over_period, hop_speed, next_event
 from vanedamp.coupling.engine.line.flow_assembly import code_of
 from vanedamp.coupling.engine.line.gap_kinematics import (
@@ -98,17 +98,17 @@ def _go_on(system, flows, st, watched, rec, scratch, periods, max_events):
     deciding, segments = False, 0
     while True:
         if deciding:
-            # one place only: its code is compiled into the loop, as a call costs more than it does
+            # here only: its code is compiled into the loop, as a call costs more than it does
             if not resolve_contact_states(system, st, rec, scratch):
                 return UNDECIDED
             if not _within_walls(system, st):
                 return ACCURACY_LOST
             deciding = False
         if st.counters[SEARCHING] == 1:
-            found = _begin_flow(system, flows, st, rec, scratch)
-            if found == NEEDS_FLOW:
+            answer = _begin_flow(system, flows, st, rec, scratch)
+            if answer == NEEDS_FLOW:
                 return NEEDS_FLOW
-            deciding = found == STATES_OPEN
+            deciding = answer == STATES_OPEN
             if deciding:
                 continue
         if st.counters[PERIOD] >= periods:
@@ -122,9 +122,9 @@ def _go_on(system, flows, st, watched, rec, scratch, periods, max_events):
         if event == ENDLESS:
             return ILL_CONDITIONED
         amplitude_changes(flows, st, scratch, tau)
-        account(system, flows, st, rec, scratch, tau)
+        end_segment(system, flows, st, rec, scratch, tau)
         _advance_motion(system, flows, st, rec, scratch, tau)
-        # the end of a period is no event: a row that has let go just before it still does
+        # the end of a period is no event: a row that has opened just before it still does
         if tau > (0.0 if event >= 0 else AT_START * system.period):
             _forget_released(st)
         if event < 0:
@@ -162,7 +162,7 @@ def _begin_flow(system, flows, st, rec, scratch):
         _change_friction(system, flows, st, rec)
         st.counters[SEARCHING] = 0
         return STATES_GO_ON
-    account_spell(system, flows, st, rec, scratch)
+    add_interval(system, flows, st, rec, scratch)
     st.counters[BEGUN] = 0
     if s < 0:
         return NEEDS_FLOW
@@ -196,16 +196,16 @@ def _change_friction(system, flows, st, rec):
             continue
         shift, column = 0.0, system.J[r]
         for i in range(n):
-            part = flows.static[s, i, i] * column[i]
+            static = flows.static[s, i, i] * column[i]
             if not flows.uncoupled[s]:
-                part = 0.0
+                static = 0.0
                 for k in range(n):
-                    part += flows.static[s, i, k] * column[k]
-            st.constant[i] += force * part
-            shift += system.response[i] * (force * part)
+                    static += flows.static[s, i, k] * column[k]
+            st.constant[i] += force * static
+            shift += system.response[i] * (force * static)
             for k in range(len(system.outputs)):
-                st.offset[1 + k] += system.outputs[k, i] * (force * part)
-        account_step(system, flows, st, rec, r, force, shift)
+                st.offset[1 + k] += system.outputs[k, i] * (force * static)
+        subtract_step(system, flows, st, rec, r, force, shift)
         _add_gains(flows.step_response[s, r], force, flows.driven[s, 0], flows.modes[s], st.amplitude, st.change)
         st.coordinate_acceleration[n + r] = flows.body_acceleration[s, r, r] * (
             system.weight[n + r] + st.applied_force[r] * column[n + r]
@@ -229,7 +229,7 @@ def _end_period(system, flows, st, watched, rec, scratch, tau):
         scratch.impulse[:] = 0.0
         wake_all(system, flows, st, rec, scratch)
     carry_over_period(system, st, watched, tau)
-    account_spell(system, flows, st, rec, scratch)
+    add_interval(system, flows, st, rec, scratch)
     st.counters[PERIOD] += 1
     st.time[0] = 0.0
     for r in range(len(st.last_impact)):
@@ -288,7 +288,7 @@ def _close_gap(system, st, scratch, r):
 
 @kernel
 def _find_flow(flows, active_set):
-    """Return the place of the subsystem of these closed rows, -1 if there is none yet."""
+    """Return the index of the subsystem of these closed rows, -1 without."""
     code = code_of(active_set)
     for s in range(len(flows.modes)):
         same = flows.modes[s] > 0 and flows.code[s] == code
@@ -332,7 +332,7 @@ def _begin_subsystem(system, flows, st, scratch, s):
 
 @inlined
 def _set_constants(system, flows, st, scratch, s):
-    """Set what the constant loads give: displacements of structure and sprung bodies, accelerations of free ones."""
+    """Set the response to constant loads: displacements of structure and sprung bodies, accelerations of free ones."""
     n, b, y = len(st.constant), system.bodies, st.coordinates
     constant_loads(system, st, scratch)
     if flows.sprung[s]:
@@ -365,15 +365,15 @@ def _set_constants(system, flows, st, scratch, s):
 def _add_product(matrix, first, x, total):
     """Add the rows of a matrix from `first` on, as many as `total` has, times x to it."""
     for i in range(len(total)):
-        part = 0.0
+        sum_ = 0.0
         for k in range(matrix.shape[1]):
-            part += matrix[first + i, k] * x[k]
-        total[i] += part
+            sum_ += matrix[first + i, k] * x[k]
+        total[i] += sum_
 
 
 @inlined
 def _set_amplitudes(system, flows, st, scratch, s):
-    """Set the amplitudes of the free modes from the motion, less its constant part and that of the excitation."""
+    """Set the amplitudes of the free modes from the motion, less its constant part and the excitation's."""
     b, e = system.bodies, len(system.frequency)
     _subtract_steady(flows.shape[s], st.amplitude, st.constant, e, st.coordinates, scratch.coordinates)
     _project(flows.project[s], flows.reach[s], scratch.coordinates, e, flows.modes[s], st.amplitude)
@@ -385,17 +385,17 @@ def _set_amplitudes(system, flows, st, scratch, s):
                 scratch.slips[b + i] -= (flows.excited[s, b + i, h] * st.amplitude[h]).real
             scratch.slips[i] -= st.slip_constant[i]
         for j in range(e, flows.modes[s]):
-            part = st.amplitude[j]
+            amplitude = st.amplitude[j]
             for i in range(2 * b):
-                part += flows.project_slip[s, j, i] * scratch.slips[i]
-            st.amplitude[j] = part
+                amplitude += flows.project_slip[s, j, i] * scratch.slips[i]
+            st.amplitude[j] = amplitude
     for j in range(flows.modes[s], len(st.amplitude)):
         st.amplitude[j] = 0.0  # loops in whole vectors go beyond the modes
 
 
 @summing
 def _subtract_steady(shape, phase, constant, harmonics, y, rest):
-    """Set the rest of y = (p, p') without its constant part and without that of the excitation."""
+    """Set the rest of y = (p, p') without its constant part and the excitation's."""
     n = len(constant)
     for i in range(n):
         rest[i], rest[n + i] = y[i] - constant[i], y[n + i]
@@ -444,9 +444,9 @@ def _set_free_accelerations(system, st):
         st.free_acceleration[r], size = 0.0, 0.0
         for body in (r if r < b else system.left_body[r], system.right_body[r]):
             if body >= 0:
-                part = system.J[r, n + body] * st.coordinate_acceleration[n + body]
-                st.free_acceleration[r] += part
-                size += abs(part)
+                term = system.J[r, n + body] * st.coordinate_acceleration[n + body]
+                st.free_acceleration[r] += term
+                size += abs(term)
         if abs(st.free_acceleration[r]) <= CANCELLED * size:
             st.free_acceleration[r] = 0.0  # bodies that fall together
 
@@ -505,7 +505,7 @@ def _select_active_modes(flows, st):
 
 @inlined
 def _activate_modes(flows, st):
-    """Activate the modes that an impulse has set in motion. None becomes inactive before its spell has ended."""
+    """Activate the modes that an impulse has set in motion. None becomes inactive within its interval."""
     s = st.counters[FLOW]
     largest, count = _largest_acceleration(flows, st, s, flows.modes[s]), flows.modes[s]
     while count > st.counters[ACTIVE]:
@@ -650,7 +650,7 @@ def _handle_event(system, flows, st, rec, scratch, r, order, meaning):
         begin_contact(system, st, rec, r)
     structure_state(flows, st, st.coordinates)
     if meaning == CLOSES:
-        align_gaps(system, st, st.coordinates)  # a motion in step with the excitation may touch at every period's start
+        align_gaps(system, st, st.coordinates)  # a steady motion may touch at every period's start
     return STATES_OPEN
 
 
@@ -671,7 +671,7 @@ def _change_amplitudes(system, flows, st, rec, scratch):
     for r in range(len(st.state)):
         impulse = scratch.impulse[r]
         if impulse != 0.0:
-            account_impact(system, flows, st, rec, r, impulse)
+            subtract_impact(system, flows, st, rec, r, impulse)
             _add_gains(
                 flows.impulse_response[s, r], impulse, flows.driven[s, 0], flows.modes[s], st.amplitude, st.change
             )

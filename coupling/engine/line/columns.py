@@ -1,4 +1,4 @@
-"""Many scenes of sliders that differ in numbers: columns over one of them (engine.columns).
+"""Many scenes of sliders that differ in numbers: columns over one (engine.columns).
 
 All numbers that have columns enter the system of sliders in closed form (system.line_system).
 """
@@ -25,61 +25,61 @@ def columns(
 
     whole, system, start: of the scene itself.
     """
-    found = repeated(whole, system, start, len(next(iter(values.values()))))
-    set_excitation(scene, whole, found, values)
-    set_starts(scene, found, values)
-    restitution = np.tile([damper.restitution for damper in scene.damper], (len(found.omega), 1))
+    batch = repeated(whole, system, start, len(next(iter(values.values()))))
+    set_excitation(scene, whole, batch, values)
+    set_starts(scene, batch, values)
+    restitution = np.tile([damper.restitution for damper in scene.damper], (len(batch.omega), 1))
     for path, numbers in values.items():
-        place = entries_of(scene, path)
-        assert place is not None
-        table, entries, key = place
+        entry = entries_of(scene, path)
+        assert entry is not None
+        table, entries, key = entry
         if table == "friction_damper":
             continue
         if key == "gap":
             rows = _rows(whole, system, np.isin(whole.cavity, entries))
             walls = rows[np.isin(whole.surface[rows - system.friction_rows], (LEFT, RIGHT))]
-            found.play[:, rows], found.rest[:, walls] = numbers[:, None], (numbers / 2)[:, None]
+            batch.play[:, rows], batch.rest[:, walls] = numbers[:, None], (numbers / 2)[:, None]
         elif key == "friction":
             pressed = pressing(scene)
             for body in entries:
-                found.limit[:, body] = [coefficient(number) * max(pressed[body], 0.0) for number in numbers]
+                batch.limit[:, body] = [coefficient(number) * max(pressed[body], 0.0) for number in numbers]
         elif key == "restitution":
             restitution[:, entries] = numbers[:, None]
     if any(path.startswith("friction_damper.") for path in values):
-        _set_grip(scene, system, found, values)
+        _set_grip(scene, system, batch, values)
     if any(path.endswith(".restitution") for path in values):
-        _set_restitution(scene, whole, system, found, restitution)
-    found.holds[:] = found.limit[:, : system.bodies]
-    return found
+        _set_restitution(scene, whole, system, batch, restitution)
+    batch.holds[:] = batch.limit[:, : system.bodies]
+    return batch
 
 
-def _set_grip(scene: Scene, system: LineSystem, found: Columns, values: Mapping[str, np.ndarray]) -> None:
-    """Set the limits of the friction dampers from those of their numbers that are among some."""
-    own = {
-        key: np.tile([getattr(damper, key) for damper in scene.friction_damper], (len(found.omega), 1))
+def _set_grip(scene: Scene, system: LineSystem, batch: Columns, values: Mapping[str, np.ndarray]) -> None:
+    """Set the limits of the friction dampers from their numbers."""
+    arrays = {
+        key: np.tile([getattr(damper, key) for damper in scene.friction_damper], (len(batch.omega), 1))
         for key in ("friction", "normal_force")
     }
     for path, numbers in values.items():
-        place = entries_of(scene, path)
-        if place is not None and place[0] == "friction_damper":
-            own[place[2]][:, place[1]] = numbers[:, None]
-    grip = np.vectorize(coefficient, otypes=[float])(own["friction"]) * own["normal_force"]
-    found.limit[:, system.bodies : system.friction_rows] = grip
+        entry = entries_of(scene, path)
+        if entry is not None and entry[0] == "friction_damper":
+            arrays[entry[2]][:, entry[1]] = numbers[:, None]
+    grip = np.vectorize(coefficient, otypes=[float])(arrays["friction"]) * arrays["normal_force"]
+    batch.limit[:, system.bodies : system.friction_rows] = grip
 
 
 def _rows(whole: System, system: LineSystem, bodies: np.ndarray) -> np.ndarray:
     """Return the contact rows of some bodies (b,) with walls and neighbours."""
     c = whole.contacts
-    own = np.isin(whole.surface[:c], (LEFT, RIGHT, BODY)) & ~whole.without_body[:c]
-    return system.friction_rows + np.flatnonzero(own & bodies[np.where(own, whole.body[:c], 0)])
+    walls = np.isin(whole.surface[:c], (LEFT, RIGHT, BODY)) & ~whole.without_body[:c]
+    return system.friction_rows + np.flatnonzero(walls & bodies[np.where(walls, whole.body[:c], 0)])
 
 
-def _set_restitution(scene: Scene, whole: System, system: LineSystem, found: Columns, restitution: np.ndarray) -> None:
-    """Set the restitutions of the rows from those of the bodies (k, b)."""
+def _set_restitution(scene: Scene, whole: System, system: LineSystem, batch: Columns, restitution: np.ndarray) -> None:
+    """Set the restitutions of the rows from the bodies' (k, b)."""
     for row in _rows(whole, system, np.ones(whole.bodies, bool)):
         unit = row - system.friction_rows
-        own, other = restitution[:, whole.body[unit]], whole.other[unit]
+        values, other = restitution[:, whole.body[unit]], whole.other[unit]
         if other >= 0:
-            pairs = zip(own.tolist(), restitution[:, other].tolist(), strict=True)
-            own = np.array([scene.contact.pair_restitution(*pair) for pair in pairs])
-        found.restitution[:, row] = own
+            pairs = zip(values.tolist(), restitution[:, other].tolist(), strict=True)
+            values = np.array([scene.contact.pair_restitution(*pair) for pair in pairs])
+        batch.restitution[:, row] = values

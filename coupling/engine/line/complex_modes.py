@@ -18,16 +18,7 @@ from scipy.linalg.lapack import dgejsv
 from scipy.sparse.csgraph import connected_components
 
 from vanedamp.coupling.engine.known import IllConditioned
-from vanedamp.coupling.engine.line.tolerances import (
-    ALIKE,
-    INDEPENDENT,
-    LIGHT,
-    MANY,
-    MIXED,
-    SETTLED,
-    SHIFTS,
-    STEPS,
-)
+from vanedamp.coupling.engine.line.tolerances import ALIKE, INDEPENDENT, LIGHT, MANY, MIXED, SETTLED, SHIFTS, STEPS
 from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST, NEARLY_EQUAL
 
 _EPS = float(np.finfo(float).eps)
@@ -55,8 +46,8 @@ def real_modes(inertia: np.ndarray, elastic: np.ndarray, loss: np.ndarray) -> Re
     if not inertia.shape[1]:
         none = np.zeros((0, 0))
         return RealModes(np.zeros(0), none, none, none)
-    found = _alike(inertia, elastic) if inertia.shape[1] >= MANY else None
-    frequency, shape, project, strain = _far_apart(inertia, elastic) if found is None else found
+    modes = _alike(inertia, elastic) if inertia.shape[1] >= MANY else None
+    frequency, shape, project, strain = _far_apart(inertia, elastic) if modes is None else modes
     size, lossy = np.abs(strain), np.abs(loss)
     damping, noise = strain.T @ loss @ strain, size.T @ lossy @ size
     # strains are known to round-off of a mode's whole strain: by that only, equal modes would be coupled and mixed
@@ -100,9 +91,7 @@ def _far_apart(inertia: np.ndarray, elastic: np.ndarray) -> tuple[np.ndarray, ..
     # a mode is known by its motion and by the strain it brings, and each entry is taken from where it is sharper:
     # soft modes hardly strain stiff springs, and quick ones hardly move heavy bodies
     shape = np.where(
-        _reach(r_inverse) < _reach(elastic_inverse) * frequency,
-        r_inverse @ v,
-        elastic_inverse @ (strain * frequency),
+        _reach(r_inverse) < _reach(elastic_inverse) * frequency, r_inverse @ v, elastic_inverse @ (strain * frequency)
     )
     project = np.where(_reach(r.T) < _reach(elastic.T) / frequency, r.T @ v, (elastic.T @ strain) / frequency).T
     return frequency, shape, project, strain
@@ -137,9 +126,9 @@ def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> tuple[np.ndarra
     q = len(frequency)
     number, block = q, np.arange(q)
     if np.count_nonzero(damping) > np.count_nonzero(np.diagonal(damping)):  # the library takes its time
-        found = _lightly_coupled(frequency, damping) if q >= MANY else None
-        if found is not None:
-            return found
+        modes = _lightly_coupled(frequency, damping) if q >= MANY else None
+        if modes is not None:
+            return modes
         number, block = connected_components(damping != 0, directed=False)
     values, shapes, left = np.zeros(2 * q, complex), np.zeros((2 * q, q), complex), np.zeros((2 * q, 2 * q), complex)
     done = 0
@@ -149,11 +138,11 @@ def complex_modes(frequency: np.ndarray, damping: np.ndarray) -> tuple[np.ndarra
         members = members[np.argsort(-frequency[members], kind="stable")]  # from quick to slow, as QR steps like it
         inside = damping[np.ix_(members, members)]
         solve = _coupled if b >= 0 else _single
-        part = np.arange(done, done + 2 * len(members))
-        values[part], shapes[np.ix_(part, members)], left[np.ix_(part, np.r_[members, q + members])] = solve(
+        columns = np.arange(done, done + 2 * len(members))
+        values[columns], shapes[np.ix_(columns, members)], left[np.ix_(columns, np.r_[members, q + members])] = solve(
             frequency[members], inside
         )
-        done += len(part)
+        done += len(columns)
     return values, np.vstack([shapes.T, shapes.T * values]), left
 
 
@@ -168,8 +157,8 @@ def _single(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     # the slow one of two real eigenvalues would cancel
     second, eye = np.where(root.imag == 0, w**2 / first, first.conj()), np.eye(len(w))
     # one difference for both: near critical damping its round-off is then common to their amplitudes
-    part = np.diag(1 / (first - second))
-    left = np.block([[-second * part, part], [first * part, -part]])
+    inverse = np.diag(1 / (first - second))
+    left = np.block([[-second * inverse, inverse], [first * inverse, -inverse]])
     return np.r_[first, second], np.vstack([eye, eye]), left
 
 
@@ -180,12 +169,12 @@ def _critical(rate: float) -> IllConditioned:
 
 def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Return `complex_modes` of real ones that damping hardly couples; None where they are not found."""
-    own = np.diag(damping)
+    diag = np.diag(damping)
     with np.errstate(all="ignore"):  # numbers of a fixed point that is none
-        found = None if np.any(own >= w) else _fixed_point(w, own, damping - np.diag(own))
-    if found is None:
+        modes = None if np.any(diag >= w) else _fixed_point(w, diag, damping - np.diag(diag))
+    if modes is None:
         return None
-    values, shapes = found
+    values, shapes = modes
     left, norm = _left(values, shapes.T, w)
     left /= norm[:, None]
     right = np.vstack([shapes, shapes * values])
@@ -194,17 +183,17 @@ def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np
     return np.r_[values, values.conj()], np.hstack([right, right.conj()]), np.vstack([left, left.conj()])
 
 
-def _fixed_point(w: np.ndarray, own: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def _fixed_point(w: np.ndarray, diag: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Return upper eigenvalues (k,) and displacements (k, k) of modes, columns with 1 in their own real mode.
 
-    own: (k,) damping of the real modes; apart: (k, k) that between them. Row k of the equation of mode k gives its
+    diag: (k,) damping of the real modes; apart: (k, k) that between them. Row k of the equation of mode k gives its
     eigenvalue, the others its small parts in other real modes. None where these do not settle, or are not small.
     """
     diagonal = np.arange(len(w))
     shapes = older = np.eye(len(w), dtype=complex)
     for _ in range(STEPS):
         coupling = (apart @ shapes.view(float)).view(complex)
-        half = (own + coupling[diagonal, diagonal]) / 2
+        half = (diag + coupling[diagonal, diagonal]) / 2
         values = -half + 1j * np.sqrt((w - half) * (w + half))
         stiffness = (values - 1j * w[:, None]) * (values + 1j * w[:, None]) + 2 * half[:, None] * values
         # what the part in a real mode brings back from the others, two steps later, belongs to that mode's own row:

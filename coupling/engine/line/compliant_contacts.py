@@ -63,7 +63,7 @@ def change_contact(system, st, rec, scratch, r, meaning):
     if meaning == OPENS:
         st.state[r] = OPEN
     elif meaning == RECLOSES:
-        # the ledger has taken the energy that the spring had when the contact ended
+        # the energy balance has taken the energy that the spring had when the contact ended
         st.state[r] = SPRUNG
         st.ledger[CONTACT] -= spring_energy(system, st, r)
     else:

@@ -1,7 +1,7 @@
 """Contact states after an event: which rows rest, stick, slip or open.
 
 Forces and accelerations complement each other (Pfeiffer and Glocker, 1996, chapter 5). Where a force and its
-acceleration vanish together, as at the instant at which a contact lets go, their rates decide in the same way.
+acceleration vanish together, as when a contact lets go, their rates decide likewise.
 """
 
 from __future__ import annotations
@@ -90,14 +90,14 @@ def stop_attached_bodies(system, flows, st):
 
 @kernel
 def keep_released(st, scratch):
-    """Keep rows released that let go at this instant, unless an impulse presses them shut."""
+    """Keep rows released that open now, unless an impulse presses them shut."""
     for r in range(len(st.state)):
         scratch.forced[r] = st.released[r]
 
 
 @kernel
 def _snap_to_rest(system, st, scratch):
-    """Set bodies exactly to rest against each other whose contacts touch without speed, to round-off."""
+    """Set bodies in touch without speed, to round-off, exactly to rest against each other."""
     tiny = slowest(system, st)
     for r in range(system.friction_rows, len(st.state)):
         scratch.touching[r] = rigid(system, r) and st.displacement[r] == 0.0 and abs(st.velocity[r]) <= tiny
@@ -234,7 +234,7 @@ def add_multiple(row, factor, total):
 
 @summing
 def row_terms(row, values, sizes):
-    """Return the sum of values by a row's factors, and that of the sizes of its terms, by sizes of the values."""
+    """Return the sum of values by a row's factors, and its terms' sizes, by sizes of the values."""
     total, terms = 0.0, 0.0
     for i in range(len(values)):
         total += row[i] * values[i]

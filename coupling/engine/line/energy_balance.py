@@ -30,8 +30,8 @@ from vanedamp.coupling.response.records import CONTACT, EXCITATION, VISCOUS
 
 
 @inlined
-def account(system, flows, st, rec, scratch, tau):
-    """Add what the segment [0, tau] has of its own: slow pairs of modes, parabolas of the bodies, the peak, samples."""
+def end_segment(system, flows, st, rec, scratch, tau):
+    """Add the segment's [0, tau] own terms: slow pairs of modes, parabolas of the bodies, the peak, samples."""
     s, period, constant = st.counters[FLOW], st.counters[PERIOD], st.offset[0]
     if system.bodies > 0:
         _free_bodies(system, flows, st, rec, scratch, s, period, tau)
@@ -45,11 +45,11 @@ def account(system, flows, st, rec, scratch, tau):
 
 
 @inlined
-def account_spell(system, flows, st, rec, scratch):
-    """Add energies, harmonic, mean square and momentum of the modes since the spell began, and begin the next one.
+def add_interval(system, flows, st, rec, scratch):
+    """Add energies, harmonic, mean square and momentum of the modes since the interval began; begin the next.
 
-    A spell is a time in one subsystem and one period. Each integral is a form of the amplitudes at its end minus that
-    at its start, without the jumps of the form at impacts in between (`account_impact`). With c the amplitudes at the
+    An interval lies in one subsystem and one period. Each integral is a form of the amplitudes at its end minus that
+    at its start, without the jumps of the form at impacts in between (`subtract_impact`). With c the amplitudes at the
     start, c + d at the end, the difference of a quadratic form Q is d Q (2 c + d): it does not cancel.
     """
     s, period, count = st.counters[FLOW], st.counters[PERIOD], st.counters[ACTIVE]
@@ -63,16 +63,16 @@ def account_spell(system, flows, st, rec, scratch):
 
 
 @inlined
-def account_impact(system, flows, st, rec, r, impulse):
-    """Take the jump of all forms at an impulse on row r (N s) out of the spell, before the amplitudes jump."""
+def subtract_impact(system, flows, st, rec, r, impulse):
+    """Take the jump of all forms at an impulse on row r (N s) out of the interval, before the amplitudes jump."""
     s = st.counters[FLOW]
-    _account_jump(
+    _subtract_jump(
         system, flows, st, rec, flows.kick[s, r], flows.kick_maps[s, r], flows.impulse_response[s, r], impulse
     )
 
 
 @inlined
-def account_step(system, flows, st, rec, r, force, shift):
+def subtract_step(system, flows, st, rec, r, force, shift):
     """Do the same at a step of the friction on body r (N), which shifts the response by its constant part (m)."""
     s, period, mean = st.counters[FLOW], st.counters[PERIOD], 0.0
     for j in range(st.counters[ACTIVE]):
@@ -82,12 +82,12 @@ def account_step(system, flows, st, rec, r, force, shift):
     rec.square[period] -= shift * mean
     rec.harmonic[period] -= shift * (complex(0.0, 1.0 / system.omega) * complex(st.change[0], -st.change[1]))
     st.offset[0] += shift
-    _account_jump(system, flows, st, rec, flows.step[s, r], flows.step_maps[s, r], flows.step_response[s, r], force)
+    _subtract_jump(system, flows, st, rec, flows.step[s, r], flows.step_maps[s, r], flows.step_response[s, r], force)
 
 
 @kernel
-def _account_jump(system, flows, st, rec, kick, maps, response, impulse):
-    """Take the jump of all forms out of the spell as the amplitudes jump by a response times an impulse."""
+def _subtract_jump(system, flows, st, rec, kick, maps, response, impulse):
+    """Take the jump of all forms out of the interval as the amplitudes jump by a response times an impulse."""
     s, period, e, back = st.counters[FLOW], st.counters[PERIOD], len(system.frequency), st.amplitude[0].conjugate()
     loss, square, contact = _kicks(kick, st.amplitude, response, impulse, flows.modes[s])
     st.ledger[VISCOUS] -= impulse * loss

@@ -38,7 +38,7 @@ from vanedamp.coupling.numerics.tolerances import RESOLUTION
 from vanedamp.coupling.response.event_log import rows_of_line
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.response.segment import START, Begun, Event, Segment, no_event
+from vanedamp.coupling.response.segment import START, Begun, Segment, SegmentEnd, no_event
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.assembly import place_sliders
 from vanedamp.coupling.system.line_system import LineSystem, rows_of_units
@@ -47,7 +47,7 @@ from vanedamp.files.toml_input import InputError
 
 
 def is_common(system: LineSystem, modes: int) -> bool:
-    """Whether this is the most common scene, for whose lengths the engine is compiled.
+    """Whether this is the most common scene, with lengths compiled in.
 
     One mode, one body between two rigid walls, one harmonic.
     """
@@ -73,7 +73,7 @@ class EngineRun(EventDrivenRun):
     def columns_of(
         self, scene: Scene, start: RestartState, values: Mapping[str, np.ndarray]
     ) -> tuple[Columns, Iterable[int]]:
-        """Return the columns of scenes, as EventDrivenRun says."""
+        """Return the columns of scenes (EventDrivenRun)."""
         return columns(scene, self.whole, self.system, start, values), ()
 
     def whole_in(self, table: Columns, k: int) -> System:
@@ -118,7 +118,7 @@ class EngineRun(EventDrivenRun):
         bend[at] = np.where(still, 0.0, st.free_acceleration[:b])
         for target, own, on_floor in ((shape, flows.motion, modal[:n]), (rate_shape, flows.velocity, modal[n:])):
             target[at] = np.where(still[:, None], 0.0, own[s, :b, active]) + line.floor @ on_floor
-        if len(system.tangential):  # a slider of a Jenkins element rests, or follows what draws it
+        if len(system.tangential):  # a slider of a Jenkins element rests, or follows its driver
             jenkins = slice(units - len(system.tangential), units)
             place_sliders(system, q, st.displacement[rows[jenkins]])
             follows = np.where(state[jenkins] == SPRUNG, 0.0, 1.0)[:, None] * system.elongation[:, :n]
@@ -146,9 +146,9 @@ class EngineRun(EventDrivenRun):
             force=force, force_shape=force_shape, drive=drive, driver=driver, open_force=open_force,
         )  # fmt: skip
 
-    def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, Event]:
+    def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, SegmentEnd]:
         system, line, rows, st, watched = self.whole, self.system, self._rows, self.state, self.watched
-        unit, what, elapsed, hits = -1, 0, 0.0, True
+        unit, event, elapsed, hits = -1, 0, 0.0, True
         if since is not START:
             roots = np.flatnonzero(watched.status == ROOT)
             k = int(roots[np.argmin(np.abs(watched.no_root_before[roots] - (st.time[0] - since.time)))])
@@ -156,14 +156,14 @@ class EngineRun(EventDrivenRun):
             elapsed = float(watched.no_root_before[k])
             elapsed = elapsed if elapsed > RESOLUTION * system.period else 0.0
             unit = int(np.flatnonzero(rows == row)[0])
-            what = int(PARTS) if meaning == AT_LOW and row >= line.friction_rows else meaning
+            event = int(PARTS) if meaning == AT_LOW and row >= line.friction_rows else meaning
             hits = watched.order[k] == POSITION and meaning == CLOSES and np.isinf(line.spring[row])
         impulse = np.zeros(len(system.J))
         impulse[: system.contacts] = self.scratch.impulse[rows[: system.contacts]] * hits
         met = {int(entry[2]): float(entry[3]) for chunk in log for entry in chunk if entry[1] == IMPACT}
         struck = [r for r in range(system.contacts) if impulse[r] != 0.0 or (met and rows[r] in met)]
         return elapsed, no_event(system)._replace(
-            unit=unit, what=what, impulse=impulse, struck=np.array(struck, int),
+            unit=unit, what=event, impulse=impulse, struck=np.array(struck, int),
             before=np.array([met.get(int(rows[r]), 0.0) for r in struck]), after=st.velocity[rows[struck]],
             loss=float(st.ledger[IMPACT_LOSS]) - since.loss,
         )  # fmt: skip

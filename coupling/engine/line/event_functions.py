@@ -7,13 +7,7 @@ import math
 from vanedamp.coupling.engine.line.gap_kinematics import measure_gaps
 from vanedamp.coupling.engine.line.sleeping import bounded_step, falls_asleep, first_to_wake, may_sleep, sleeps, wake
 from vanedamp.coupling.engine.line.tolerances import ADHESION, RECLOSING
-from vanedamp.coupling.engine.root_search import (
-    ENDLESS,
-    MOST,
-    add_secular,
-    expand,
-    step_or_stop,
-)
+from vanedamp.coupling.engine.root_search import ENDLESS, MOST, add_secular, expand, step_or_stop
 from vanedamp.coupling.numerics.codes import (
     ACTIVE,
     AT_HIGH,
@@ -44,7 +38,7 @@ from vanedamp.coupling.numerics.compiler.jit import ZERO, inlined, kernel, summi
 from vanedamp.coupling.numerics.exponentials import secular_bound
 from vanedamp.coupling.numerics.tolerances import AT_START, CHATTER, RESOLUTION
 
-#: in periods: what is known without a root at a period's start is left out from here on, at the price of exponentials
+#: in periods: functions without a root at a period's start are left out from here on, at the price of exponentials
 _AHEAD = 0.02
 
 
@@ -52,7 +46,7 @@ _AHEAD = 0.02
 def next_event(system, flows, st, watched, rec):
     """Return the time to the next event, its event function and its side, or to the period's end and -1.
 
-    ENDLESS in place of -1 if it finds neither. Results beyond the period's end are kept for the next segment
+    ENDLESS instead of -1 if it finds neither. Results beyond the period's end are kept for the next segment
     (`carry_over_period`).
     """
     s = st.counters[FLOW]
@@ -106,7 +100,7 @@ def next_event(system, flows, st, watched, rec):
         # the side that the motion approaches first: the other one is evaluated until then
         two = watched.sides[k] == 2
         side = 1 if two and taylor[0, 1] > 0.0 else 0
-        step, found, clear = step_or_stop(
+        step, is_root, clear = step_or_stop(
             watched.expansion, 1.0 - 2.0 * side, watched.k0[k, side], watched.k0[k, 1 - side] if two else math.inf,
             max(noise, watched.noise[k]), second, calm, fast, longest, shortest,
         )  # fmt: skip
@@ -116,10 +110,10 @@ def next_event(system, flows, st, watched, rec):
                 second, calm, fast, step, shortest,
             )  # fmt: skip
             if other < step:
-                step, found, side = other, root, 1 - side
+                step, is_root, side = other, root, 1 - side
         watched.side[k] = side
-        watched.status[k] = ROOT if found else EXPANDED
-        watched.no_root_before[k] = tau + step if found else max(watched.no_root_before[k], tau + step)
+        watched.status[k] = ROOT if is_root else EXPANDED
+        watched.no_root_before[k] = tau + step if is_root else max(watched.no_root_before[k], tau + step)
 
 
 @inlined
@@ -134,7 +128,7 @@ def carry_over_period(system, st, watched, tau):
 
 @inlined
 def _list_functions(system, flows, st, watched, s, woken, count):
-    """Set up the event functions of the segment, or add those of the body that wakes. Return their number.
+    """Set up the event functions of the segment, or add those of the activated body. Return their number.
 
     woken: the first contact of that body, 0 without one.
     """
@@ -248,9 +242,9 @@ def _set_motion(functional, amplitude, eigenvalue, sign, g, count):
     """Set the amplitudes of a motion's exponentials. Return its first two derivatives and a bound of the second."""
     first, second, bound = 0.0, 0.0, 0.0
     for j in range(count):
-        rate, part = eigenvalue[j], sign * (functional[j] * amplitude[j])
-        g[j] = part
-        once = rate * part
+        rate, term = eigenvalue[j], sign * (functional[j] * amplitude[j])
+        g[j] = term
+        once = rate * term
         first += once.real
         second += rate.real * once.real - rate.imag * once.imag
         bound += (abs(once.real) + abs(once.imag)) * (abs(rate.real) + abs(rate.imag))
@@ -286,12 +280,12 @@ def _set_growth(
         excitation = eigenvalue[h]
         for j in range(driven[h], driven[h + 1]):
             rate = eigenvalue[j]
-            part = (on_motion * motion[j] + on_velocity * velocity[j] + on_force * force[j]) * load[j] * phase[h]
-            drive[j] = part
-            first += part.real
-            second += (part * (rate + excitation)).real
-            second_bound += secular_bound(part, rate, excitation, period, 2)
-            third_bound += secular_bound(part, rate, excitation, period, 3)
+            term = (on_motion * motion[j] + on_velocity * velocity[j] + on_force * force[j]) * load[j] * phase[h]
+            drive[j] = term
+            first += term.real
+            second += (term * (rate + excitation)).real
+            second_bound += secular_bound(term, rate, excitation, period, 2)
+            third_bound += secular_bound(term, rate, excitation, period, 3)
     return first, second, second_bound, third_bound
 
 
@@ -392,12 +386,12 @@ def _set_force(functional, amplitude, eigenvalue, g, count):
     """Set the amplitudes of a force's exponentials. Return its swing, value, slope and a bound of its curvature."""
     swing, value, slope, bound = 0.0, 0.0, 0.0, 0.0
     for j in range(count):
-        rate, part = eigenvalue[j], functional[j] * amplitude[j]
-        g[j] = part
-        size = math.sqrt(part.real * part.real + part.imag * part.imag)
+        rate, term = eigenvalue[j], functional[j] * amplitude[j]
+        g[j] = term
+        size = math.sqrt(term.real * term.real + term.imag * term.imag)
         swing += size
-        value += part.real
-        slope += rate.real * part.real - rate.imag * part.imag
+        value += term.real
+        slope += rate.real * term.real - rate.imag * term.imag
         bound += size * (rate.real * rate.real + rate.imag * rate.imag)
     return swing, value, slope, bound
 

@@ -1,4 +1,4 @@
-"""The exact flow of a subsystem at a frequency, in compiled code: sets a place of line.subsystem_assembly.Flows."""
+"""The exact flow of a subsystem at a frequency, in compiled code: sets an index of line.subsystem_assembly.Flows."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def new_assembly_scratch(system: LineSystem) -> AssemblyScratch:
 
 @kernel
 def code_of(closed):
-    """Return a number of the closed rows (r,) by which most others are told from them."""
+    """Return a hash of the closed rows (r,)."""
     code = 0
     for r in range(len(closed)):
         if closed[r]:
@@ -69,7 +69,7 @@ def code_of(closed):
 
 @entry
 def fill(system, subsystems, k, flows, s, scratch):
-    """Set place s of the flows, whatever it was before, to subsystem k under the excitation.
+    """Set index s of the flows to subsystem k under the excitation.
 
     Returns whether doubles resolve it: otherwise its modes cancel, it rests too far away under its weight, or it is
     excited at a resonance without damping.
@@ -106,11 +106,11 @@ def _keeps_digits(system, subsystems, k):
     """Whether modes do not cancel: round-off in a state (p, xi, p', xi') grows to no more than LOST, or FAR."""
     size, omega, grows, natural = len(system.mass), system.omega, subsystems.round_off[k], subsystems.natural[k]
     for i in range(size):
-        own = max(omega, natural[i])
+        frequency = max(omega, natural[i])
         for j in range(size):
             other = max(omega, natural[j])
             largest = max(grows[i, j], grows[i, size + j] * other)
-            largest = max(largest, grows[size + i, j] / own, grows[size + i, size + j] * (other / own))
+            largest = max(largest, grows[size + i, j] / frequency, grows[size + i, size + j] * (other / frequency))
             if not largest <= 1.0:
                 return False
     return True
@@ -164,14 +164,14 @@ def _respond(system, subsystems, k, h, scratch):
         for a in range(q):
             for c in range(q):
                 scratch.stiffness[a, c] = complex(0.0, omega * subsystems.damping[k, a, c])
-            own = subsystems.frequency[k, a]
-            scratch.stiffness[a, a] += own * own - omega * omega
+            frequency = subsystems.frequency[k, a]
+            scratch.stiffness[a, a] += frequency * frequency - omega * omega
         if not solve(scratch.stiffness, x, q):
             return False
     else:
         for a in range(q):
-            own = subsystems.frequency[k, a]
-            stiffness = complex(own * own - omega * omega, omega * subsystems.damping[k, a, a])
+            frequency = subsystems.frequency[k, a]
+            stiffness = complex(frequency * frequency - omega * omega, omega * subsystems.damping[k, a, a])
             if stiffness == 0.0:
                 return False
             x[a] *= reciprocal(stiffness)
@@ -183,14 +183,14 @@ def _respond(system, subsystems, k, h, scratch):
 
 @kernel
 def _drives(system, subsystems, k, h, driver):
-    """Mark the modes that harmonic h drives. Return whether there are any."""
-    found, omega, near = False, system.frequency[h], subsystems.near[k] / system.period
+    """Mark the modes that harmonic h drives. Return whether any."""
+    driven, omega, near = False, system.frequency[h], subsystems.near[k] / system.period
     for j in range(subsystems.modes[k]):
         rate = subsystems.eigenvalue[k, j]
         apart = omega - rate.imag
         if rate.real * rate.real + apart * apart < near * near:
-            driver[j], found = h, True
-    return found
+            driver[j], driven = h, True
+    return driven
 
 
 @kernel
@@ -200,9 +200,9 @@ def _sum_modes(system, subsystems, k, h, scratch):
     for j in range(subsystems.modes[k]):
         push, push_back, rate = 0.0j, 0.0j, subsystems.eigenvalue[k, j]
         for i in range(len(system.mass)):
-            part = subsystems.push[k, j, i]
-            push += part * system.load[h, i]
-            push_back += part.conjugate() * system.load[h, i]
+            term = subsystems.push[k, j, i]
+            push += term * system.load[h, i]
+            push_back += term.conjugate() * system.load[h, i]
         half = 0.5 if rate.imag > 0.0 else 1.0
         if scratch.driver[j] == h:
             # a real load turns half with the harmonic, half against it, with the conjugate
@@ -223,22 +223,22 @@ def _sum_modes(system, subsystems, k, h, scratch):
 @kernel
 def _order_modes(flows, s, count, scratch):
     """Put driven modes first, in order of the harmonics that drive them."""
-    e, place, forms = flows.driven.shape[1] - 1, np.int64(0), scratch.forms
+    e, rank, forms = flows.driven.shape[1] - 1, np.int64(0), scratch.forms
     for h in range(e + 1):
-        flows.driven[s, h] = e + place
+        flows.driven[s, h] = e + rank
         for j in range(count):
             if scratch.driver[j] == h:
-                scratch.order[place], forms.frame[e + place] = j, h if h < e else -1
-                flows.load[s, e + place] = scratch.push[j] if h < e else 0.0
-                place += 1
+                scratch.order[rank], forms.frame[e + rank] = j, h if h < e else -1
+                flows.load[s, e + rank] = scratch.push[j] if h < e else 0.0
+                rank += 1
 
 
 @kernel
 def _take_modes(system, subsystems, k, flows, s, count, scratch):
     """Set the functionals of the subsystem's own modes."""
     e, n, b = len(system.frequency), system.modes, system.bodies
-    for place in range(count):
-        i, j = scratch.order[place], e + place
+    for rank in range(count):
+        i, j = scratch.order[rank], e + rank
         rate = subsystems.eigenvalue[k, i]
         flows.eigenvalue[s, j], scratch.forms.inverse_rate[j] = rate, reciprocal(rate)
         flows.response[s, j], flows.momentum[s, j] = subsystems.response[k, i], subsystems.momentum[k, i]
@@ -285,13 +285,13 @@ def _set_harmonic(system, subsystems, k, flows, s, h, scratch):
     flows.support[s, h, 0], flows.support[s, h, 1] = min(lowest, highest), highest
     momentum = 0.0j
     for i in range(b):
-        own, rate = steady[n + i], turn * steady[n + i]
+        motion, rate = steady[n + i], turn * steady[n + i]
         for j in range(first, last):
             rate += subsystems.slip_shape[k, scratch.order[j - e], i] * load[j]
-        flows.excited[s, i, h], flows.excited[s, b + i, h] = own, rate
+        flows.excited[s, i, h], flows.excited[s, b + i, h] = motion, rate
         if subsystems.free[k, i]:
-            own -= system.load[h, n + i] / (system.mass[n + i] * omega * omega)
-        scratch.own[i], x = own, own
+            motion -= system.load[h, n + i] / (system.mass[n + i] * omega * omega)
+        scratch.own[i], x = motion, motion
         for l in range(n):
             x += subsystems.carrier[k, i, l] * steady[l]
         rate = turn * x
@@ -325,17 +325,17 @@ def _set_outputs(system, flows, s, count):
 
 @kernel
 def _set_motion(system, subsystems, k, flows, s, h, r, scratch):
-    """Set displacement and velocity of a row in a harmonic. Return its size, and that of the structure's terms."""
+    """Set displacement and velocity of a row in a harmonic. Return its size, and the structure's terms'."""
     n, turn, move, terms = system.modes, flows.eigenvalue[s, h], 0.0j, 0.0
     for i in range(n):
-        part = subsystems.functional[k, r, i] * flows.shape[s, h, i]
-        move += part
-        terms += abs(part)
+        term = subsystems.functional[k, r, i] * flows.shape[s, h, i]
+        move += term
+        terms += abs(term)
     held = terms
     for i in range(system.bodies):
-        part = system.J[r, n + i] * scratch.own[i]
-        move += part
-        terms += abs(part)
+        term = system.J[r, n + i] * scratch.own[i]
+        move += term
+        terms += abs(term)
     if abs(move) <= CANCELLED * terms:
         move = 0.0j  # line.subsystems._functionals
     rate = turn * move
@@ -368,9 +368,9 @@ def _set_forces(system, subsystems, k, flows, s, h, scratch):
         for i in range(len(system.mass)):
             excited += system.J[r, i] * (system.load[h, i] / system.mass[i])
         for i in range(2 * n):
-            part = subsystems.pull[k, r, i] * flows.shape[s, h, i]
-            pulled += part
-            terms += abs(part)
+            term = subsystems.pull[k, r, i] * flows.shape[s, h, i]
+            pulled += term
+            terms += abs(term)
         for c in range(rows):
             if closed[c] and system.spring[c] < np.inf:
                 pulled += system.delassus[r, c] * flows.force[s, c, h]
@@ -387,7 +387,7 @@ def _set_forces(system, subsystems, k, flows, s, h, scratch):
 
 @kernel
 def _take_constants(system, subsystems, k, flows, s):
-    """Set what the excitation does not change."""
+    """Set what does not depend on the excitation."""
     n, b, flows.coalescing[s] = system.modes, system.bodies, subsystems.coalescing[k]
     flows.sprung[s], flows.damped[s], flows.uncoupled[s], flows.tied[s] = (
         subsystems.sprung[k], subsystems.damped[k], subsystems.uncoupled[k], subsystems.tied[k]
@@ -426,14 +426,14 @@ def _set_energies(system, flows, s, m, forms):
                 forms.free[j] += system.mass[n + i] * flows.velocity[s, i, j]
     set_linear(system, flows, s, m, forms)
     pairs = invert_rates(flows, s, m, system.period, forms)
-    for what in range(3):  # one place only, which is compiled once
-        if what == 0:
+    for energy in range(3):  # here only: compiled once
+        if energy == 0:
             form, slow = flows.loss[s], flows.slow_loss[s]
             split(flows.shape[s, :m, n:], forms.left)
             for j in range(m):
                 forms.span[j, 0], forms.span[j, 1] = flows.support[s, j, 0], flows.support[s, j, 1]
             damp(system.damping, forms.left, forms.right, forms.span, m, n, system.proportional)
-        elif what == 1:
+        elif energy == 1:
             form, slow = flows.square[s], flows.slow_square[s]
             take_factor(flows.response[s], flows.response[s], 1.0, 0, m, forms)
         else:
@@ -448,9 +448,9 @@ def _set_energies(system, flows, s, m, forms):
         if flows.coalescing[s]:  # line.energy_balance integrates by quadrature
             form[: 2 * m, : 2 * m], slow[:pairs] = 0.0, 0.0
         for r in range(rows if jumps else 0):
-            kick(flows.impulse_response[s, r, :m], form, flows.kick[s, r, what])
+            kick(flows.impulse_response[s, r, :m], form, flows.kick[s, r, energy])
         for r in range(crowd):
-            kick(flows.step_response[s, r, :m], form, flows.step[s, r, what])
+            kick(flows.step_response[s, r, :m], form, flows.step[s, r, energy])
     flows.slow_count[s] = list_single(flows, s, m, system.period, pairs)
     for r in range(rows if jumps else 0):
         _set_maps(flows, s, e, m, flows.impulse_response[s, r], flows.kick_maps[s, r])

@@ -41,16 +41,16 @@ def align_gaps(system, st, y):
         if system.moves_with_floor[r] or st.state[r] != OPEN or st.displacement[r] < CLOSING * scale:
             continue
         k, sign = (system.left_body[r], -1.0) if system.left_body[r] >= 0 else (system.right_body[r], 1.0)
-        place, speed = 0.0, 0.0
+        position, speed = 0.0, 0.0
         if k >= 0:  # a stop has no body
-            place, speed = sign * (st.displacement[k] + st.low_word[k]), sign * st.velocity[k]
+            position, speed = sign * (st.displacement[k] + st.low_word[k]), sign * st.velocity[k]
         for i in range(n):
             apart = system.J[r, i]
             if k >= 0:
                 apart += sign * system.floor[k, i]
-            place += apart * y[i]
+            position += apart * y[i]
             speed += apart * y[n + i]
-        st.displacement[r], st.velocity[r] = system.rest[r] + place, speed
+        st.displacement[r], st.velocity[r] = system.rest[r] + position, speed
 
 
 @inlined
@@ -58,8 +58,8 @@ def shift_slip(st, r, shift):
     """Add to the displacement of row r without loss (Knuth's exact sum of two doubles)."""
     old = st.displacement[r]
     new = old + shift
-    part = new - old
-    low = st.low_word[r] + ((old - (new - part)) + (shift - part))
+    change = new - old
+    low = st.low_word[r] + ((old - (new - change)) + (shift - change))
     st.displacement[r] = new + low
     st.low_word[r] = low - (st.displacement[r] - new)
 
@@ -73,7 +73,7 @@ def mark_only(scratch, r):
 
 @inlined
 def join_places(system, st, scratch):
-    """Put bodies whose contacts are marked (scratch.touching) exactly where they touch, from the walls inwards."""
+    """Put bodies with marked contacts (scratch.touching) exactly in touch, from the walls inwards."""
     slip, low, friction = st.displacement, st.low_word, system.friction_rows
     for r in range(friction, len(st.state)):
         left_body, right_body = system.left_body[r], system.right_body[r]
@@ -93,7 +93,7 @@ def join_places(system, st, scratch):
 
 @kernel
 def join_speeds(system, st, scratch):
-    """Give bodies whose contacts are marked (scratch.touching) exactly the same speed, that of a wall if it is one."""
+    """Give bodies with marked contacts (scratch.touching) exactly the same speed, or a wall's."""
     speed, friction = st.velocity, system.friction_rows
     for r in range(friction, len(st.state)):
         if scratch.touching[r] and system.moves_with_floor[r]:

@@ -77,7 +77,7 @@ def simultaneous_impacts(system, st, rec, scratch):
     for p in range(k):
         r = scratch.listed[p]
         speed = st.velocity[r] if abs(st.velocity[r]) > tiny else 0.0
-        # kept before the jump, for the ledger and the log
+        # before the jump, for energies and log
         scratch.jerk[p], scratch.acceleration[p] = speed, min(speed, 0.0)
         restitution = restitution_at(system, r, -speed)
         collapsed = st.time[0] - st.last_impact[r] < COLLAPSE * system.period
@@ -110,7 +110,7 @@ def simultaneous_impacts(system, st, rec, scratch):
 def _flight_part(restitution):
     """Return the fraction of the rest of a chatter that its next flight takes.
 
-    An elastic contact has no chatter of its own, but the losses of other contacts may shorten its flights without end.
+    An elastic contact has no chatter, but the losses of other contacts may shorten its flights without end.
     """
     return max(1.0 - restitution, 0.1)
 
@@ -118,14 +118,14 @@ def _flight_part(restitution):
 @kernel
 def _mark_slow_departures(system, st, scratch, k):
     """Mark the contacts (scratch.bound) that rest or would separate too slowly. Return whether any would separate."""
-    problem, found = scratch.problem, False
+    problem, marked = scratch.problem, False
     for p in range(k):
         r = scratch.listed[p]
         scratch.bound[p] = problem.restitution[p] == 0.0 or scratch.acceleration[p] == 0.0
         after = problem.acceleration[p] - problem.restitution[p] * scratch.acceleration[p]
         if problem.state[p] == AT_LOW and after < _flight_part(restitution_at(system, r, after)) * st.capture_speed[r]:
-            scratch.bound[p], found = True, True
-    return found
+            scratch.bound[p], marked = True, True
+    return marked
 
 
 @kernel
@@ -181,9 +181,9 @@ def _apply_impulses(system, st, scratch, k):
             continue
         change, size = 0.0, 0.0
         for p in range(k):
-            part = system.delassus[r, scratch.listed[p]] * problem.force[p]
-            change += part
-            size += abs(part)
+            term = system.delassus[r, scratch.listed[p]] * problem.force[p]
+            change += term
+            size += abs(term)
         if abs(change) > JUMP * size:
             speed[r] += change
     measure_gaps(system, st)
@@ -200,7 +200,7 @@ def _apply_impulses(system, st, scratch, k):
             elif system.right_body[r] < 0:
                 speed[system.left_body[r]] = -after
         else:
-            # one that still approaches does so by less than the solver tells from zero
+            # one that still approaches is below the solver's resolution
             scratch.touching[r] = speed[r] <= tiny
         if scratch.touching[r] and not system.moves_with_floor[r]:
             speed[r] = 0.0

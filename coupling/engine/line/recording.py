@@ -1,4 +1,4 @@
-"""What a run records: the log of events, which response.evaluation names, and the section at the start of a period."""
+"""Records of a run: the log of events, which response.evaluation names, and the section at the start of a period."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def log_impact(system, st, rec, r, before, after, impulse):
 
 @kernel
 def _count(counters, impacts, collided, energy):
-    """Count an impact and the energy of its relative motion, J. A call of its own: compiled in, it slows the loop."""
+    """Count an impact and the energy of its relative motion, J. A separate call: compiled in, it slows the loop."""
     counters[IMPACTS] += 1
     impacts[counters[PERIOD]] += 1
     collided[counters[PERIOD]] += energy
@@ -68,24 +68,24 @@ def _at_wall(system, state, body):
 
 @inlined
 def record_start(system, flows, st, rec, scratch):
-    """Record section and ledger at the start of a period."""
+    """Record section and energies at the start of a period."""
     n, b, y, springs = len(st.constant), system.bodies, scratch.coordinates, 0.0
     structure_state(flows, st, y)
     for r in range(len(st.state)):
         # a Jenkins element keeps its spring's energy while it slides
         if st.state[r] == SPRUNG or (r < system.friction_rows and not rigid(system, r) and system.limit[r] > 0.0):
             springs += spring_energy(system, st, r)
-    p, rate, section, part = y[:n], y[n:], rec.section[st.counters[PERIOD]], rec.parts[st.counters[PERIOD]]
+    p, rate, section, energies = y[:n], y[n:], rec.section[st.counters[PERIOD]], rec.parts[st.counters[PERIOD]]
     x, velocity, energy = _structure(system.response, system.stiffness, p, rate)
     energy, momentum = energy + springs, 0.0
-    part[0] = energy
+    energies[0] = energy
     for k in range(b):
         speed, height = st.velocity[k] + _dot(system.floor[k], rate), st.displacement[k]
         if system.weight[n + k] != 0.0:
             height += _dot(system.floor[k], p)
         momentum += system.mass[n + k] * speed
-        part[1 + k] = 0.5 * system.mass[n + k] * speed * speed - system.weight[n + k] * height
-        energy += part[1 + k]
+        energies[1 + k] = 0.5 * system.mass[n + k] * speed * speed - system.weight[n + k] * height
+        energy += energies[1 + k]
         section[3 + k], section[3 + b + k] = st.displacement[k], st.velocity[k]
     put_response(system, rec, st.counters[PERIOD], x, velocity, momentum, energy, st.ledger)
 

@@ -47,15 +47,15 @@ def _fill_known(system, subsystems, st, flows, assembly):
 
 @kernel
 def _take_numbers(columns, base, flows, setup, measured, k, linked):
-    """Set what differs between scenes (engine.scenes.take_numbers)."""
+    """Set the scenes' differences (engine.scenes.take_numbers)."""
     take_numbers(columns, base, flows, setup, measured, k, linked, True, base.friction_rows)
 
 
 @kernel
 def _is_outside(system, st, columns, k, linked, left):
-    """Return whether scene k begins beyond a wall or a stop: it is to be moved, or refused, by Python.
+    """Return whether scene k begins beyond a wall or a stop: Python moves or rejects it.
 
-    left: the number of the scene that has left the state of a linked one; as long as there is none, Python says how
+    left: the number of the scene that has left the state of a linked one; while there is none, Python says how
     a scene begins.
     """
     if linked and k > 0 and left == 0:
@@ -90,12 +90,12 @@ def _set_start(system, st, watched, columns, k):
     """Set the state at time zero to the start of scene k: rows from slips and the structure's motion."""
     n, b, e, friction = system.modes, system.bodies, len(system.frequency), system.friction_rows
     slip, slip_velocity = columns.slip[k], columns.slip_velocity[k]
-    for part in (
+    for array in (
         st.change, st.low_word, st.contact_impulse, st.ledger, st.applied_force, st.capture_speed, st.time,
         st.largest_speed, st.offset, st.constant, st.slip_constant, st.constant_force, st.free_acceleration,
         st.coordinate_acceleration,
     ):  # fmt: skip
-        part[:] = 0.0
+        array[:] = 0.0
     st.counters[:], st.released[:], st.active_set[:], watched.status[:], st.asleep[:] = 0, 0, False, 0, 0
     st.last_impact[:] = -math.inf
     for j in range(len(st.amplitude)):
@@ -106,7 +106,7 @@ def _set_start(system, st, watched, columns, k):
     p, p_rate = st.coordinates[:n], st.coordinates[n:]
     for r in range(len(st.state)):
         st.state[r] = COAST if r < friction else OPEN
-        place, moved, speed, terms = system.rest[r], 0.0, 0.0, 0.0
+        gap, moved, speed, terms = system.rest[r], 0.0, 0.0, 0.0
         for i in range(n):
             moved += system.J[r, i] * p[i]
             speed += system.J[r, i] * p_rate[i]
@@ -117,10 +117,10 @@ def _set_start(system, st, watched, columns, k):
             for i in range(n):
                 on_floor += system.floor[body, i] * p[i]
                 rate += system.floor[body, i] * p_rate[i]
-            place += system.J[r, n + body] * slip[body]
+            gap += system.J[r, n + body] * slip[body]
             moved += system.J[r, n + body] * on_floor
             speed += system.J[r, n + body] * (slip_velocity[body] + rate)
-        st.displacement[r], st.velocity[r] = place + moved, speed
+        st.displacement[r], st.velocity[r] = gap + moved, speed
         if r < b:  # relative to the floor, so that a body at relative rest is known to be so
             st.displacement[r], st.velocity[r] = slip[r], slip_velocity[r]
         elif r < friction and not rigid(system, r):

@@ -1,10 +1,10 @@
 """Bodies that sleep: so far from any event that nothing elsewhere can bring them to one for a while.
 
-Each is alone in its cavity and slips or coasts. Until it wakes, its event functions keep half of their values, by the
+Each is single in its cavity and slips or coasts. Until it wakes, its event functions keep half of their values, by the
 bounds of their second derivatives; what events elsewhere may change is spent from that half. An impulse P on row q
 moves row k by at most P (|W| t + a_k b_q t^2/2) within t: W, of Delassus's matrix, is the rate at the start, and
 a_k b_q bounds the second derivative, a sum over the modes (Cauchy and Schwarz; `stir` of Flows). So an event in a crowd
-costs as much as the bodies close to one of their own.
+costs as much as nearby bodies.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from vanedamp.coupling.system.line_system import LineSystem
 #: bodies times modes from which on bodies sleep, and the shortest sleep, in periods over bodies: others cost time
 CROWD, _DOZE = 100, 0.25
 
-#: of a sleeping body: when it wakes, and since when it sleeps, s in the period; its place, the lower word of that, and
-#: its speed then, and what the structure has of both; what is left of its margins, m and m/s
+#: of an inactive body: when it is activated, and since when it is inactive, s in the period; its position, the lower
+#: word of that, and its speed then, the structure's parts of both; the rest of its margins, m and m/s
 UNTIL, SINCE, PLACE, LOW, SPEED, PART, RATE, MARGIN, SPEED_MARGIN = range(9)
 SLEEP = 9
 
@@ -48,7 +48,7 @@ def sleeps(system, st, r):
 
 @inlined
 def bounded_step(value, slope, bound):
-    """Return the time before which a function has no root whose second derivative is nowhere below -bound."""
+    """Return the time without a root of a function whose second derivative is at least -bound."""
     if value > 0.0 or (value == 0.0 and slope > 0.0):
         return first_root_of_parabola(value, slope, -bound)
     return 0.0
@@ -56,7 +56,7 @@ def bounded_step(value, slope, bound):
 
 @inlined
 def falls_asleep(system, flows, st, watched, r, k):
-    """Let the body of contact r sleep, whose gap is event function k, if it is alone and it pays. Return whether."""
+    """Let the body of contact r sleep, whose gap is event function k, if it is single and that pays. Return whether."""
     first = _first_contact(system, st, r)
     if first < 0 or st.released[system.right_body[first]] != 0:
         return False
@@ -86,7 +86,7 @@ def falls_asleep(system, flows, st, watched, r, k):
 
 @inlined
 def _first_contact(system, st, r):
-    """Return the first contact of the body of contact r if it is alone, open to walls that move with it; else -1."""
+    """Return the first contact of the body of contact r if single, open to walls that move with it; else -1."""
     first = r if system.left_body[r] < 0 else r - 1
     if first < system.friction_rows or first + 1 == len(st.state):
         return -1
@@ -100,11 +100,11 @@ def _first_contact(system, st, r):
 
 @inlined
 def _of_structure(system, flows, st, b):
-    """Return what the structure has of a body's slip, m, and of its rate, m/s."""
-    part = real_sum(flows.motion[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE])
+    """Return the structure's part of a body's slip, m, and of its rate, m/s."""
+    position = real_sum(flows.motion[st.counters[FLOW], b], st.amplitude, st.counters[ACTIVE])
     for i in range(len(st.constant)):
-        part += system.J[b, i] * st.constant[i]
-    return part, _rate(flows, st, b)
+        position += system.J[b, i] * st.constant[i]
+    return position, _rate(flows, st, b)
 
 
 @inlined
@@ -125,7 +125,7 @@ def first_to_wake(st):
 
 @inlined
 def free_speed(flows, st, b):
-    """Return the speed of a free body without what the structure has of it, m/s."""
+    """Return the speed of a free body without the structure's part, m/s."""
     if st.asleep[b] != 0:
         body = st.sleepers[b]
         return (body[SPEED] - body[RATE]) + st.free_acceleration[b] * (st.time[0] - body[SINCE])
@@ -134,11 +134,11 @@ def free_speed(flows, st, b):
 
 @kernel
 def _bring(system, flows, st, b):
-    """Bring a sleeping body to the present. Return how far it has slipped since it fell asleep, m."""
+    """Update an inactive body. Return its slip since it became inactive, m."""
     body, time = st.sleepers[b], st.time[0] - st.sleepers[b, SINCE]
-    part, rate = _of_structure(system, flows, st, b)
+    position, rate = _of_structure(system, flows, st, b)
     free, bend = body[SPEED] - body[RATE], st.free_acceleration[b]
-    shift = (part - body[PART]) + time * (free + 0.5 * bend * time)
+    shift = (position - body[PART]) + time * (free + 0.5 * bend * time)
     st.displacement[b], st.low_word[b], st.velocity[b] = body[PLACE], body[LOW], (free + bend * time) + rate
     shift_slip(st, b, shift)
     return shift
@@ -174,7 +174,7 @@ def _wake_struck(system, flows, st, rec, scratch, b):
 
 @kernel
 def show_sleepers(system, flows, st):
-    """Set displacements and velocities of sleeping bodies, for who looks at them; they go on sleeping."""
+    """Set displacements and velocities of inactive bodies, which stay inactive."""
     for b in range(system.bodies):
         if st.asleep[b] != 0:
             _bring(system, flows, st, b)

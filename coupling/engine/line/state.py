@@ -94,7 +94,7 @@ class EventFunctions(NamedTuple):
     no_root_before: Annotated[np.ndarray, "k"]  # time before which no root lies; its first root once that is known, s
     side: Annotated[np.ndarray, "k", int]  # side of that root
 
-    expansion: Expansion  # of one of them
+    expansion: Expansion  # of one
 
 
 @record

@@ -8,7 +8,7 @@ In the steady state of harmonic h, mode r would respond with load_r c_h/(i omega
 hardly damped, this and c_r are large and cancel. Such driven modes keep this motion in c_r, which the harmonic makes
 grow by c_r' = lambda_r c_r + load_r c_h: c_r(t) = c_r exp(lambda_r t) + load_r c_h D(t) with
 D(t) = (exp(i omega_h t) - exp(lambda_r t))/(i omega_h - lambda_r), which is t exp(i omega_h t) at resonance without
-damping (numerics.exponentials.secular). Harmonics lie further apart than that: each mode is driven by one of them. All
+damping (numerics.exponentials.secular). Harmonics lie further apart than that: each mode is driven by one. All
 rows stay functionals of c.
 """
 
@@ -71,7 +71,7 @@ class Flows(NamedTuple):
     excited: Annotated[np.ndarray, "s 2b e", complex]  # the excitation in xi of sprung bodies and its rate
     static: Annotated[np.ndarray, "s N N"]  # constant (p, xi) under constant loads on (p, x)
     constrained: Annotated[np.ndarray, "s N n"]  # constant (p, xi) kept by constraints inside the structure
-    tied: Annotated[np.ndarray, "s", bool]  # whether there are any
+    tied: Annotated[np.ndarray, "s", bool]  # whether any
     body_acceleration: Annotated[np.ndarray, "s b b"]  # of free bodies under constant loads
     closed_inverse: Annotated[np.ndarray, "s r r"]  # inverse Delassus matrix of the rigid closed rows
     impulse_response: Annotated[np.ndarray, "s r m", complex]  # change of c by a unit impulse on a row
@@ -112,7 +112,7 @@ class Flows(NamedTuple):
 def empty_flows(system: LineSystem, capacity: int | None = None) -> Flows:
     """Return storage for `capacity` subsystems, none of them filled (modes 0): a few, or as many as there is room for.
 
-    Those of many modes are not copied to more room later: much of it stays zero, and takes no memory.
+    Stacks of many modes are not copied later: zeros take no memory.
     """
     if capacity is None:
         few = system.modes < MANY

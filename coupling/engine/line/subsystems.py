@@ -30,12 +30,12 @@ class Subsystems(NamedTuple):
     largest number of complex modes, one of each conjugate pair: z = Re sum_j shape_j c_j; other sizes as in line.state.
     """
 
-    number: Annotated[np.ndarray, "k", int]  # in the order in which they were found, of all systems; 0: a free index
+    number: Annotated[np.ndarray, "k", int]  # in the order they were found, of all systems; 0: a free index
     closed: Annotated[np.ndarray, "k r", bool]  # which rows are closed
     held: Annotated[np.ndarray, "k b", bool]  # whether rigid rows hold a body to the structure
     free: Annotated[np.ndarray, "k b", bool]  # whether a body moves freely
     sprung: Annotated[np.ndarray, "k", bool]  # whether springs are closed
-    damped: Annotated[np.ndarray, "k", bool]  # whether some of them move and have dashpots
+    damped: Annotated[np.ndarray, "k", bool]  # whether some move and have dashpots
     uncoupled: Annotated[np.ndarray, "k", bool]  # whether damping couples no two complex modes
     coalescing: Annotated[np.ndarray, "k", bool]  # whether some of these nearly coalesce
     carrier: Annotated[np.ndarray, "k b n"]  # functional of each body that moves with the structure
@@ -43,7 +43,7 @@ class Subsystems(NamedTuple):
     pull: Annotated[np.ndarray, "k r 2n"]  # acceleration of each row by (p, p'), no row closed
     static: Annotated[np.ndarray, "k N N"]  # z under constant loads on (p, x)
     constrained: Annotated[np.ndarray, "k N n"]  # constant z that constraints inside the structure keep
-    tied: Annotated[np.ndarray, "k", bool]  # whether there are any
+    tied: Annotated[np.ndarray, "k", bool]  # whether any
     body_acceleration: Annotated[np.ndarray, "k b b"]  # of free bodies under constant loads
     closed_inverse: Annotated[np.ndarray, "k r r"]  # inverse Delassus matrix of the rigid closed rows
 
@@ -76,7 +76,7 @@ class Subsystems(NamedTuple):
     acceleration: Annotated[np.ndarray, "k m"]  # largest of its terms, whether closed rows hold them or not
 
     # growth of round-off in a state (z, z') that is split into modes and summed, over what is allowed, if rates count
-    # as displacements; and the frequency of each coordinate alone, by which they count
+    # as displacements; and each coordinate's own frequency, by which they count
     round_off: Annotated[np.ndarray, "k 2N 2N"]
     natural: Annotated[np.ndarray, "k N"]  # rad/s
 
@@ -97,8 +97,8 @@ def most_modes(system: LineSystem) -> int:
     Schwarz no motion x has a damping x^T C x of 2 sqrt(x^T M x x^T K x), and modes come in pairs of which one is kept.
     """
     most = system.modes + system.bodies * bool(np.isfinite(system.spring[system.friction_rows :]).any())
-    part, light = system.of_structure, system.modes >= MANY and system.proportional and not system.dashpot.any()
-    return most if light and np.all(np.diag(part.damping) <= np.sqrt(part.stiffness)) else 2 * most
+    structure, light = system.of_structure, system.modes >= MANY and system.proportional and not system.dashpot.any()
+    return most if light and np.all(np.diag(structure.damping) <= np.sqrt(structure.stiffness)) else 2 * most
 
 
 #: parts of a system that decide its subsystems
@@ -124,7 +124,7 @@ def _subsystem(system: LineSystem, key: np.ndarray) -> dict[str, Any]:
     carrier[springs.anchored] = system.floor[springs.anchored]
     functional = _functional(system, carrier)
     law = np.hstack([functional[sprung], system.J[sprung, n:]])
-    real, lift, drop, loads, kept = _real_modes(system, carrier, cluster, inner, springs, sprung, law)
+    real, lift, drop, loads, projector = _real_modes(system, carrier, cluster, inner, springs, sprung, law)
     q, (eigenvalue, shape, project) = len(drop), _complex_modes(real)
     m = len(eigenvalue)
     push, coalescing = _times(loads.T, project[:, q:].T).T, coalesce(eigenvalue, shape, project)
@@ -140,13 +140,13 @@ def _subsystem(system: LineSystem, key: np.ndarray) -> dict[str, Any]:
         "closed": key, "held": cluster < 0, "free": free, "sprung": len(sprung) > 0,
         "uncoupled": system.proportional and not len(closed) and m == n, "coalescing": coalescing,
         "carrier": carrier, "functional": functional,
-        "static": lift / real.frequency**2 @ loads, "constrained": kept, "body_acceleration": acceleration,
+        "static": lift / real.frequency**2 @ loads, "constrained": projector, "body_acceleration": acceleration,
         "coordinates": q, "frequency": real.frequency, "damping": real.damping,
         "mixed": np.count_nonzero(real.damping) > np.count_nonzero(np.diagonal(real.damping)), "lift": lift,
         "loads": loads, "modes": m, "near": DRIVEN, "eigenvalue": eigenvalue,
         "shape": shape[:, :n].reshape(2 * n, m).T, "support": _support(shape[:, :n]), "slip_shape": shape[0, n:].T,
         "project": project[:, :, :n].reshape(m, 2 * n), "project_slip": project[:, :, n:].reshape(m, 2 * b),
-        "reach": _support(project[:, :, :n].transpose(1, 2, 0)), "tied": len(kept) > 0, "push": push,
+        "reach": _support(project[:, :, :n].transpose(1, 2, 0)), "tied": len(projector) > 0, "push": push,
         "impulse_response": _times(system.J[:, :n], project[:, 1, :n].T),
     }  # fmt: skip
 
@@ -177,11 +177,11 @@ def _real_modes(
         real = real_modes(np.sqrt(np.r_[np.ones(n), system.of_bodies.mass])[:, None] * loads.T, elastic @ lift, loss)
     # from here on eta are the amplitudes of the real modes
     lift, drop, loads = lift @ real.shape, real.project @ drop, real.shape.T @ loads
-    kept = np.zeros((0, n))
+    projector = np.zeros((0, n))
     if len(inner):
-        kept = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
-        kept -= lift / real.frequency**2 @ (elastic @ lift).T @ elastic @ kept
-    return real, lift, drop, loads, kept
+        projector = np.vstack([np.eye(n) - basis @ basis.T, np.zeros((b, n))])
+        projector -= lift / real.frequency**2 @ (elastic @ lift).T @ elastic @ projector
+    return real, lift, drop, loads, projector
 
 
 def _complex_modes(real: RealModes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -214,12 +214,12 @@ def _functionals(
 ) -> dict[str, Any]:
     """Return bodies, rows and response as functionals of the modes, and the modes' sizes. shape: (N, m)."""
     n = system.modes
-    p, own = shape[:n], shape[n:]
-    body, of_bodies = _times(carrier, p) + own, system.J[:, n:]
-    motion = _times(functional, p) + _times(of_bodies, own)
-    # terms by their sizes: a mode may be where no row feels it as long as others are closed
+    p, slips = shape[:n], shape[n:]
+    body, of_bodies = _times(carrier, p) + slips, system.J[:, n:]
+    motion = _times(functional, p) + _times(of_bodies, slips)
+    # terms by their sizes: a mode may move no row while others are closed
     held = np.abs(functional) @ np.abs(p)
-    terms = held + np.abs(of_bodies) @ np.abs(own)
+    terms = held + np.abs(of_bodies) @ np.abs(slips)
     # a row that others hold is at rest: round-off would make a Jenkins element there stick and slip without end
     motion[np.abs(motion) <= CANCELLED * terms] = 0.0
     response, rate = system.response[:n] @ p, np.abs(eigenvalue)
@@ -276,11 +276,11 @@ def _round_off(
     m = len(project)
     size, vectors, inverse = size.ravel(), shape.reshape(2 * (n + b), m), project.reshape(m, 2 * (n + b))
     natural = np.sqrt((system.stiffness + system.spring[sprung] @ law**2) / system.mass)
-    own = np.r_[np.ones(n + b), np.where(natural > 0, natural, 1.0)]
+    scale = np.r_[np.ones(n + b), np.where(natural > 0, natural, 1.0)]
     # of many modes a bound serves (Cauchy and Schwarz) where it is far below what is allowed
     into = np.linalg.norm(vectors, axis=1) / size
     out = np.linalg.norm(inverse, axis=0) * size * (np.finfo(float).eps / LOST)
-    if m >= MANY and (into / own).max() * (out * own).max() < SURE:
+    if m >= MANY and (into / scale).max() * (out * scale).max() < SURE:
         return {"round_off": np.outer(into, out), "natural": natural}
     parts = np.abs(vectors.real) @ np.abs(inverse.real) + np.abs(vectors.imag) @ np.abs(inverse.imag)
     # the search for events uses only the modulus of an amplitude
@@ -358,20 +358,20 @@ def _sprung_bodies(system: LineSystem, cluster: np.ndarray, sprung: np.ndarray) 
     links = system.of_bodies.J[sprung] @ member.T
     # the last node is the structure
     ends = [np.r_[np.flatnonzero(link), groups][:2] for link in links if link.any()]
-    part = _connected(ends, groups + 1)
+    component = _connected(ends, groups + 1)
     columns, rests = [np.zeros((b, 0))], [np.zeros((0, b))]
     first = np.array([member[g] * (np.arange(b) == np.argmax(member[g])) for g in range(groups)]).reshape(groups, b)
-    for c in np.unique(part[:groups]):
-        inside = np.flatnonzero(part[:groups] == c)
-        if c == part[groups]:
+    for c in np.unique(component[:groups]):
+        inside = np.flatnonzero(component[:groups] == c)
+        if c == component[groups]:
             columns.append(member[inside].T)
             rests.append(first[inside])
         elif len(inside) > 1:
             spread, gather = _about_centre(member[inside] @ system.of_bodies.mass)
             columns.append(member[inside].T @ spread)
             rests.append(gather @ first[inside])
-    anchored = (cluster >= 0) & (part[cluster] == part[groups])
-    return _SprungBodies(np.hstack(columns), np.vstack(rests), anchored, np.where(cluster < 0, -1, part[cluster]))
+    anchored = (cluster >= 0) & (component[cluster] == component[groups])
+    return _SprungBodies(np.hstack(columns), np.vstack(rests), anchored, np.where(cluster < 0, -1, component[cluster]))
 
 
 def _about_centre(mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,6 @@
-"""Tolerances of the engine for sliders. Every comment says what the number is multiplied by, and what follows below.
+"""Tolerances of the engine for sliders. Comments say what each multiplies, and what follows below.
 
-Those that other layers share are in numerics.tolerances.
+Those of other layers are in numerics.tolerances.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ RECLOSING = 1e-15
 # --- impacts and rows
 #: round-off of the speed that a row gains in an impact: times the sum of the absolute values of its terms
 JUMP = 1e-13
-#: a row moves with others if what remains of it is below this: times the size of its terms
+#: a row moves with others if its remainder is below this, times the size of its terms
 MOVES_ALIKE = 1e-12
 
 # --- modes
 #: acceleration of a mode, times the largest of all modes, below which the mode is inactive until the next impact
 INACTIVE = 1e-14
 #: fraction of a mode's coordinates, times the largest entry of the rows and the response, that its acceleration counts
-#: even where these do not feel it: it then becomes inactive when its energy is round-off
+#: even uncoupled: it then becomes inactive when its energy is round-off
 UNSEEN = 1e-7
 #: |i omega_h - lambda| times the period, below which a harmonic drives a mode. Beyond, the steady-state response is at
 #: most 1/DRIVEN times the growth in one period: less than two digits cancel. Driven modes cost time: a wider bound

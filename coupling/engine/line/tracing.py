@@ -1,4 +1,4 @@
-"""What a course says of a run of sliders (engine.trace), in the coordinates of its System."""
+"""The course of a run of sliders (engine.trace), in the coordinates of its System."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ def note_segment(system, flows, st, watched, scratch, trace, i):
     trace.open_force[i, :] = 0.0
     for u in range(units):
         r = trace.rows[u]
-        own, contact = st.state[r], r >= system.friction_rows
-        trace.state[i, u] = own
-        if own == HELD or own == TOUCHING:
+        state, contact = st.state[r], r >= system.friction_rows
+        trace.state[i, u] = state
+        if state == HELD or state == TOUCHING:
             trace.open_force[i, u if contact else units + u] = st.applied_force[r]
-        if u >= units - sliders:  # a slider of a Jenkins element rests, or follows what draws it
+        if u >= units - sliders:  # a slider of a Jenkins element rests, or follows its driver
             at = n + b + u - (units - sliders)
             q[at], v[at] = -st.displacement[r], 0.0
             for j in range(n):
                 q[at] += system.J[r, j] * y[j]
-                if own != SPRUNG:
+                if state != SPRUNG:
                     v[at] += system.J[r, j] * y[n + j]
-            if own == SPRUNG:
+            if state == SPRUNG:
                 trace.state[i, u] = STICK
     trace.speed[i] = max(st.largest_speed[0], trace.fastest[0])
     for r in range(len(st.velocity)):

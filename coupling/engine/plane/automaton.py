@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from vanedamp.coupling.engine.plane.contact_states import decide, move_sliders
-from vanedamp.coupling.engine.plane.energy_balance import account, move, response_at
+from vanedamp.coupling.engine.plane.energy_balance import end_segment, move, response_at
 from vanedamp.coupling.engine.plane.event_functions import next_event
 from vanedamp.coupling.engine.plane.friction_work import add_friction_work
 from vanedamp.coupling.engine.plane.impacts import collide, log_event, log_impact, stop_wedged
@@ -71,9 +71,9 @@ from vanedamp.coupling.system.unit_kinematics import (
 
 #: events at one instant after which contacts are said to be undecided, for each unit
 _AT_ONCE = 20
-#: events at one instant after which a decision that repeats itself is made anew, for each unit
+#: events at one instant after which a repeated decision is revised, per unit
 _REPEATED = 4
-#: how often a decision is made anew where its forces break their laws
+#: how often a decision is revised whose forces break their laws
 _ATTEMPTS = 4
 _TINY = 1e-150
 
@@ -101,11 +101,11 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
             return PAUSED
         segments += 1
         if st.counters[BEGUN] == 0:  # once: it takes round-off away, which another beginning would take again
-            found = _begin_flow(system, flows, st, rec, scratch)
-            if found == STATES_OPEN:
+            outcome = _begin_flow(system, flows, st, rec, scratch)
+            if outcome == STATES_OPEN:
                 continue
-            if found != STATES_GO_ON:
-                return found
+            if outcome != STATES_GO_ON:
+                return outcome
             st.counters[BEGUN] = 1
         if st.counters[EVENTS] >= max_events:
             return EVENT_BUDGET
@@ -134,7 +134,7 @@ def advance(system, flows, st, watched, rec, scratch, periods, max_events):
 
 @inlined
 def _begin_flow(system, flows, st, rec, scratch):
-    """Begin the motion of the states as decided, if forces obey their laws in it; that of the last states goes on.
+    """Begin the motion of the states as decided, if forces obey their laws in it; the last states' motion continues.
 
     Returns STATES_GO_ON, STATES_OPEN where other states are to be tried, NEEDS_FLOW or UNDECIDED.
     """
@@ -173,7 +173,7 @@ def _move(system, flows, st, rec, scratch, tau):
     if rec.worn.shape[1] > 0 and flows.rubs[st.counters[FLOW]]:
         add_friction_work(system, flows, st, rec, scratch, tau)
     move(system, flows, st, scratch, tau, q, v)
-    account(system, flows, st, rec, scratch, tau, q, v)
+    end_segment(system, flows, st, rec, scratch, tau, q, v)
     for i in range(len(q)):
         st.q[i], st.v[i] = q[i], v[i]
     for r in range(len(st.fresh)):
@@ -228,7 +228,7 @@ def _begin_contacts(system, st, rec):
 
 @kernel
 def _end_contact(system, st, rec, r):
-    """End a compliant contact as its force vanishes: what its spring still holds is lost."""
+    """End a compliant contact as its force vanishes: its spring's energy is lost."""
     u, shift, speed = len(system.rest), gap(system, r, st.q), row_speed(system, r, st.v)
     left = 0.5 * system.spring[r] * shift * shift
     st.ledger[CONTACT] += left
@@ -243,46 +243,46 @@ def _end_contact(system, st, rec, r):
 def _is_unloaded(system, st, r):
     """Whether the force of a compliant contact has vanished, but for round-off of its gap, and it parts.
 
-    Its friction is at both of its bounds there, and round-off would tell which of them, or its end, comes first.
+    Its friction is at both of its bounds there, and round-off would decide which comes first.
     """
     spent = spring_force(system, r, st.q, st.v) <= least_force(system, r)
     return spent and row_speed(system, r, st.v) > AT_REST * st.scale[0]
 
 
 @kernel
-def _end_unloaded(system, st, rec, r, what):
+def _end_unloaded(system, st, rec, r, event):
     """End the other compliant contacts whose forces vanish within round-off at the event of unit r: they may pull."""
     for i in range(system.contacts):
         presses = is_compliant(system, i) and st.state[i] < OPEN and st.fresh[i] == 0
-        if presses and not (what == RECLOSES and i == r) and _is_unloaded(system, st, i):
+        if presses and not (event == RECLOSES and i == r) and _is_unloaded(system, st, i):
             _end_contact(system, st, rec, i)
 
 
 @inlined
-def _handle_event(system, flows, st, rec, scratch, r, what):
+def _handle_event(system, flows, st, rec, scratch, r, event):
     """Apply the event of unit r and decide the states after it. Returns False if they cannot be decided."""
     st.counters[EVENTS] += 1
     st.counters[AT_ONCE] += 1
     scratch.attempt[0] = st.counters[AT_ONCE] // (_REPEATED * len(system.rest))
     if st.counters[AT_ONCE] > _AT_ONCE * len(system.rest):
         return False
-    if what == CLOSES and _almost_closes(system, st):
+    if event == CLOSES and _almost_closes(system, st):
         _project(system, flows, st, st.counters[FLOW])
     st.scale[0] = max(st.scale[0], speed_scale(system, st.v))
     for i in range(len(system.rest)):
         scratch.before[i] = st.state[i]
-    _change_unit(system, st, rec, r, what)
-    _end_unloaded(system, st, rec, r, what)
+    _change_unit(system, st, rec, r, event)
+    _end_unloaded(system, st, rec, r, event)
     # at any event another gap may be closed as well, within the resolution of gaps
     if _approaches(system, st) and not collide(system, st, rec, scratch):
         return False
     _begin_contacts(system, st, rec)
     if not _decide_states(system, st, rec, scratch):
         return False
-    own = is_compliant(system, r) or system.contacts <= r < len(system.rest) - len(system.tangential)
-    if own and (what == AT_LOW or what == AT_HIGH) and scratch.attempt[0] > 0 and st.state[r] == STICK:
+    has_spring = is_compliant(system, r) or system.contacts <= r < len(system.rest) - len(system.tangential)
+    if has_spring and (event == AT_LOW or event == AT_HIGH) and scratch.attempt[0] > 0 and st.state[r] == STICK:
         # again and again: the decision's force is short of its known bound by round-off, that of the motion is not
-        st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT
+        st.state[r] = SLIP_RIGHT if event == AT_LOW else SLIP_LEFT
         st.other[r] = st.state[r]
     for i in range(len(system.rest)):
         changed = scratch.before[i] != st.state[i] or st.other[i] != st.state[i]
@@ -292,24 +292,24 @@ def _handle_event(system, flows, st, rec, scratch, r, what):
 
 
 @inlined
-def _change_unit(system, st, rec, r, what):
-    """Change the state of unit r as its event says."""
+def _change_unit(system, st, rec, r, event):
+    """Change the state of unit r by its event."""
     elements = len(system.rest) - len(system.tangential)  # the first Jenkins element
-    at_bound = what == AT_LOW or what == AT_HIGH
-    if what == CLOSES:
+    at_bound = event == AT_LOW or event == AT_HIGH
+    if event == CLOSES:
         _close_gap(system, st, r)
-    elif is_compliant(system, r) and (what == PARTS or (at_bound and _is_unloaded(system, st, r))):
+    elif is_compliant(system, r) and (event == PARTS or (at_bound and _is_unloaded(system, st, r))):
         _end_contact(system, st, rec, r)
-    elif what == OPENS:
+    elif event == OPENS:
         st.state[r] = OPEN
         _close_gap(system, st, r)
-    elif what == RECLOSES:
+    elif event == RECLOSES:
         st.state[r] = SLIP_RIGHT  # decided next; the ledger has taken the energy that the spring has
         st.ledger[CONTACT] -= 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
     elif r >= elements and at_bound:
-        st.state[r] = SLIP_RIGHT if what == AT_LOW else SLIP_LEFT  # decided next: its spring is at its bound
-    elif what == STOPS and r < elements:
-        # what the resolution of time leaves of its slip is rest
+        st.state[r] = SLIP_RIGHT if event == AT_LOW else SLIP_LEFT  # decided next: its spring is at its bound
+    elif event == STOPS and r < elements:
+        # the slip within the resolution of time is rest
         st.scale[0] = max(st.scale[0], abs(row_speed(system, len(system.rest) + r, st.v)) / AT_REST)
 
 
@@ -347,7 +347,7 @@ def _log_changes(system, flows, st, rec):
 
 @kernel
 def _close_gap(system, st, r):
-    """Shift the unit's body by what round-off has left of its gap: the contact is closed, exactly."""
+    """Shift the unit's body by its gap's round-off: the contact is closed, exactly."""
     error, square = gap(system, r, st.q), 0.0
     for i in range(len(st.q)):
         square += system.J[r, i] * system.J[r, i] / system.mass[i]
@@ -370,7 +370,7 @@ def _find_flow(flows, st):
 
 @kernel
 def _stop_held_rows(system, flows, st):
-    """Stop what the contacts hold, and enter what that takes from the motion."""
+    """Stop what the contacts hold, and enter the loss."""
     size, loss = len(st.q) - len(system.tangential), 0.0  # sliders have no mass
     st.prestress[:] = 0.0
     for i in range(size):
@@ -493,15 +493,15 @@ def _reverses(system, flows, st, row, way):
     """Whether a row at rest accelerates against its way, now or right after."""
     s, total, rate, size = st.counters[FLOW], 0.0, 0.0, 0.0
     for i in range(len(st.q)):
-        part = system.J[row, i] * st.bend[i]
-        total += part
-        size += abs(part)
+        term = system.J[row, i] * st.bend[i]
+        total += term
+        size += abs(term)
     for j in range(flows.modes[s]):
         eigenvalue = flows.eigenvalue[s, j]
-        part = flows.rows[s, row, j] * st.amplitude[j] * eigenvalue * eigenvalue
-        total += part.real
-        size += abs(part.real) + abs(part.imag)
-        rate += (part * eigenvalue).real
+        term = flows.rows[s, row, j] * st.amplitude[j] * eigenvalue * eigenvalue
+        total += term.real
+        size += abs(term.real) + abs(term.imag)
+        rate += (term * eigenvalue).real
     return way * total < -BEYOND * size or (way * total <= BEYOND * size and way * rate < 0.0)
 
 
@@ -512,10 +512,10 @@ def _violates(system, flows, st, r, on_normal, on_slip):
     room = system.limit[r] + on_normal * st.force[r] + on_slip * st.force[u + r]
     size = system.limit[r] + abs(on_normal * st.force[r]) + abs(on_slip * st.force[u + r])
     for j in range(flows.modes[s]):
-        part = (on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]) * st.amplitude[j]
-        room += part.real
-        rate += (part * flows.eigenvalue[s, j]).real
-        size += abs(part.real) + abs(part.imag)
+        term = (on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]) * st.amplitude[j]
+        room += term.real
+        rate += (term * flows.eigenvalue[s, j]).real
+        size += abs(term.real) + abs(term.imag)
     return room < -BEYOND * size or (room <= BEYOND * size and rate < 0.0)
 
 
@@ -565,11 +565,11 @@ def _begin_segment(system, flows, st):
             st.force[r] += flows.force_held[s, r, k] * st.q[k]
     swing = 0.0
     for i in range(size):
-        part = abs(st.v[i])
+        speed = abs(st.v[i])
         for j in range(flows.modes[s]):
             rate = flows.velocity[s, i, j] * st.amplitude[j]
-            part += abs(rate.real) + abs(rate.imag)
-        swing = max(swing, part * st.reach[i])
+            speed += abs(rate.real) + abs(rate.imag)
+        swing = max(swing, speed * st.reach[i])
     st.scale[0] = max(swing, system.speed)
 
 

@@ -1,4 +1,4 @@
-"""Many scenes of bodies in the plane that differ in numbers: columns over one of them (engine.columns).
+"""Many scenes of planar bodies that differ in numbers: columns over one (engine.columns).
 
 Frequency, level and starts are known by themselves; what gaps, friction and restitution change is read from the systems
 of the scenes.
@@ -10,15 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vanedamp.coupling.engine.columns import (
-    STARTS,
-    Columns,
-    foreseen,
-    repeated,
-    set_excitation,
-    set_starts,
-    system_in,
-)
+from vanedamp.coupling.engine.columns import STARTS, Columns, foreseen, repeated, set_excitation, set_starts, system_in
 from vanedamp.coupling.response.restart import start_of
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.scene.paths import with_numbers
@@ -37,18 +29,18 @@ def columns(
 ) -> tuple[Columns, list[int]]:
     """Return the columns of scenes that differ from `scene` in some numbers, by paths: (k,) each.
 
-    Beside them the places of scenes that differ in more than columns have. whole, start: of the scene itself.
+    Returned too: indices of scenes that differ in more than columns. whole, start: of the scene itself.
     """
-    found, outside = repeated(whole, whole, start, len(next(iter(values.values())))), list[int]()
+    batch, outside = repeated(whole, whole, start, len(next(iter(values.values())))), list[int]()
     if len(foreseen(scene, values)) == len(values):
-        set_excitation(scene, whole, found, values)
-        set_starts(scene, found, values)
-        for k in range(len(found.omega)):
-            own = with_scales(system_in(whole, found, k, np.arange(len(whole.rest))))
-            found.moment[k], found.speed[k] = own.moment, own.speed
-        return found, outside
+        set_excitation(scene, whole, batch, values)
+        set_starts(scene, batch, values)
+        for k in range(len(batch.omega)):
+            own = with_scales(system_in(whole, batch, k, np.arange(len(whole.rest))))
+            batch.moment[k], batch.speed[k] = own.moment, own.speed
+        return batch, outside
     data = scene.to_dict()
-    for k in range(len(found.omega)):
+    for k in range(len(batch.omega)):
         try:
             own = with_numbers(scene, data, {path: float(numbers[k]) for path, numbers in values.items()})
             system = assemble(own)
@@ -61,7 +53,7 @@ def columns(
             outside.append(k)
             continue
         for name in _WITH_COLUMNS:
-            getattr(found, name)[k] = getattr(system, name)
+            getattr(batch, name)[k] = getattr(system, name)
         for name in STARTS:
-            getattr(found, name)[k] = getattr(begun, name)
-    return found, outside
+            getattr(batch, name)[k] = getattr(begun, name)
+    return batch, outside

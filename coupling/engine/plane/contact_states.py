@@ -26,12 +26,12 @@ from vanedamp.coupling.system.unit_kinematics import (
     spring_force,
 )
 
-#: factor of the moment after which is decided what an instant leaves open, each time that a decision is made anew
+#: shrink the look-ahead by this at each revised decision
 _SOONER = 0.1
 _NORMAL, _SLIP = 1, 2
-#: what a compliant contact that touches without speed does
+#: states of a compliant contact that touches without speed
 _TOUCHES, _PRESSES, _OPENS = 1, 2, 3
-#: of a Jenkins element: its spring is at its bound, and what draws it is at rest
+#: of a Jenkins element: its spring is at its bound, its driver at rest
 _AT_BOUND = 4
 
 
@@ -61,14 +61,14 @@ def free_acceleration(system, scratch, q, v, time):
     for j in range(len(system.tangential)):
         force = system.tangential[j] * elongation(system, j, q)
         for i in range(size - len(system.tangential)):
-            part = system.elongation[j, i] * force / system.mass[i]
-            scratch.free[i] -= part
-            scratch.terms[i] += abs(part)
+            term = system.elongation[j, i] * force / system.mass[i]
+            scratch.free[i] -= term
+            scratch.terms[i] += abs(term)
 
 
 @kernel
 def move_sliders(system, state, q, v):
-    """Bring sliders to where they are: at rest, or as far behind what draws them as their springs go."""
+    """Bring sliders to their positions: at rest, or behind their drivers by their springs."""
     sliders, size = len(system.tangential), len(q)
     for j in range(sliders):
         r, a = len(system.rest) - sliders + j, size - sliders + j
@@ -80,18 +80,18 @@ def move_sliders(system, state, q, v):
 
 @kernel
 def _hold_sliders(system, st, scratch, slow):
-    """Decide which sliders rest, and which what draws them moves: those whose springs are at their bounds.
+    """Decide which sliders rest, and which move: those whose springs are at their bounds.
 
-    One whose spring is at its bound while what draws it is at rest is marked: its acceleration decides. Sliders that
+    One whose spring is at its bound while its driver is at rest is marked: its acceleration decides. Sliders that
     have moved until now are at their bounds.
     """
     sliders, size = len(system.tangential), len(st.q)
     for j in range(sliders):
         r, stretched, terms, speed = len(system.rest) - sliders + j, 0.0, 0.0, 0.0
         for i in range(size):
-            part = system.elongation[j, i] * st.q[i]
-            stretched += part
-            terms += abs(part)
+            term = system.elongation[j, i] * st.q[i]
+            stretched += term
+            terms += abs(term)
         for i in range(size - sliders):
             speed += system.elongation[j, i] * st.v[i]
         most, way = system.limit[r] / system.tangential[j], SLIP_RIGHT if stretched > 0.0 else SLIP_LEFT
@@ -108,7 +108,7 @@ def _hold_sliders(system, st, scratch, slow):
 
 @kernel
 def _draw_sliders(system, st, scratch, nothing):
-    """Decide by accelerations whether what is at rest draws its slider on. Returns how many stay in doubt, drawn."""
+    """Decide by accelerations whether drivers at rest draw their sliders on. Returns how many stay in doubt, drawn."""
     u, sliders, doubts = len(system.rest), len(system.tangential), 0
     for j in range(sliders):
         r, acceleration, mobility = u - sliders + j, 0.0, 0.0
@@ -159,7 +159,7 @@ def _solve_states(system, st, scratch, count, terms, nothing):
 
 @kernel
 def _classify(system, scratch, count, nothing):
-    """States (scratch.verdict) of the listed units from the solution, and what it leaves open (scratch.doubtful)."""
+    """States (scratch.verdict) of the listed units from the solution, and doubtful ones (scratch.doubtful)."""
     problem = scratch.lemke
     for p in range(count):
         r, i = scratch.listed[p], scratch.place[p]
@@ -174,7 +174,7 @@ def _classify(system, scratch, count, nothing):
             scratch.verdict[p] = SLIP_RIGHT
         else:
             first = i + 1 if contact else i
-            # a spring without force has no friction: both bounds are one, and the acceleration tells
+            # a spring without force has no friction: both bounds are one; the acceleration decides
             left = problem.w[first + 1] <= nothing and problem.z[first + 1] > nothing
             if problem.z[first] <= nothing and not left:
                 scratch.verdict[p] = SLIP_RIGHT
@@ -291,7 +291,7 @@ def _stop_approach(system, st, r):
 
 @inlined
 def _is_pressed(system, st, scratch, r, slow):
-    """Whether a compliant contact is closed, for all that its gap and speed tell.
+    """Whether a compliant contact is closed, by gap and speed.
 
     One that touches without speed has no force yet, and is marked: its acceleration decides.
     """
@@ -351,9 +351,9 @@ def loaded_acceleration(system, st, scratch, q, v, time):
                 force = 0.0  # it would press others
             scratch.bound[r] = system.friction[r] * force
             for i in range(len(q)):
-                part = system.J[r, i] * force / system.mass[i]
-                scratch.free[i] += part
-                scratch.terms[i] += abs(part)
+                term = system.J[r, i] * force / system.mass[i]
+                scratch.free[i] += term
+                scratch.terms[i] += abs(term)
         if scratch.sliding[r] != 0:
             for i in range(len(q)):
                 scratch.free[i] -= scratch.sliding[r] * scratch.bound[r] * system.J[u + r, i] / system.mass[i]
@@ -370,9 +370,9 @@ def loaded_acceleration(system, st, scratch, q, v, time):
 
 @kernel
 def _decide_later(system, st, scratch, count):
-    """Decide what was left open by the accelerations a moment later. Returns False if that cannot be solved.
+    """Decide doubtful contacts by accelerations a moment later. Returns False if that cannot be solved.
 
-    Where forces have only begun, they may all be others after that moment: a decision made anew looks less far ahead.
+    Where forces have only begun, they may all be others after that moment: a revised decision looks less far ahead.
     """
     u, size = len(system.rest), len(st.q)
     for i in range(size):
@@ -391,7 +391,7 @@ def _decide_later(system, st, scratch, count):
     terms = loaded_acceleration(system, st, scratch, scratch.later[0], scratch.later[1], st.time[0] + moment)
     if not _solve_states(system, st, scratch, count, terms, DOUBTFUL_LATER):
         return False
-    # which of contacts that depend on each other carry the force is decided for all of them together
+    # which of contacts that depend on each other carry the force is decided for all together
     carriers = False
     for p in range(count):
         carriers = carriers or scratch.doubt[p] == _NORMAL
@@ -421,26 +421,26 @@ def _before_end(system, st, scratch, count, acceleration, moment):
 
 @kernel
 def _stick_in_doubt(system, scratch, count):
-    """Let contacts stick whose friction is at its bound though nothing moves them, unless others hold their slip.
+    """Let contacts stick whose friction is at its bound unless others hold their slip.
 
     Both corners of a block that lies still may push against each other. Where others hold its slip, a force at the
-    bound is one of the possible ones (st.other); contacts share the force as long as none of them needs more than its
+    bound is one of the possible ones (st.other); contacts share the force while none of them needs more than its
     bound (automaton._forces_suffice).
     """
-    u, found = len(system.rest), 0
+    u, rank = len(system.rest), 0
     for p in range(count):
         r = scratch.listed[p]
         if scratch.verdict[p] < OPEN and is_rigid(system, r):
-            found = extend_basis(system, scratch, r, found)
+            rank = extend_basis(system, scratch, r, rank)
     for p in range(count):
         if scratch.verdict[p] == STICK:
-            found = extend_basis(system, scratch, u + scratch.listed[p], found)
+            rank = extend_basis(system, scratch, u + scratch.listed[p], rank)
     for p in range(count):
         r = scratch.listed[p]
         if scratch.doubtful[p] == _SLIP and _may_stick(system, scratch, p):
-            more = extend_basis(system, scratch, u + r, found)
-            if more > found:
-                scratch.verdict[p], found = STICK, more
+            more = extend_basis(system, scratch, u + r, rank)
+            if more > rank:
+                scratch.verdict[p], rank = STICK, more
 
 
 @inlined
@@ -451,26 +451,26 @@ def _may_stick(system, scratch, p):
 
 
 @kernel
-def extend_basis(system, scratch, row, found):
+def extend_basis(system, scratch, row, rank):
     """Add a row to the orthonormal basis of those that are kept. Returns its size, the same if they hold the row."""
     size, whole, left = len(system.mass), 0.0, 0.0
-    if found >= size:
-        return found
-    new = scratch.span[found]
+    if rank >= size:
+        return rank
+    new = scratch.span[rank]
     for i in range(size):
         new[i] = system.J[row, i] / math.sqrt(system.mass[i])
         whole += new[i] * new[i]
     for _ in range(2):
-        for k in range(found):
-            part = 0.0
+        for k in range(rank):
+            product = 0.0
             for i in range(size):
-                part += scratch.span[k, i] * new[i]
+                product += scratch.span[k, i] * new[i]
             for i in range(size):
-                new[i] -= part * scratch.span[k, i]
+                new[i] -= product * scratch.span[k, i]
     for i in range(size):
         left += new[i] * new[i]
     if left <= DEPENDENCE * whole:
-        return found
+        return rank
     for i in range(size):
         new[i] /= math.sqrt(left)
-    return found + 1
+    return rank + 1

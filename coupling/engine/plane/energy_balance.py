@@ -44,7 +44,7 @@ def move(system, flows, st, scratch, t, q, v):
 
 
 @inlined
-def account(system, flows, st, rec, scratch, tau, q, v):
+def end_segment(system, flows, st, rec, scratch, tau, q, v):
     """Add the segment [0, tau], at whose end coordinates and velocities are q and v (`move`)."""
     s, period, count = st.counters[FLOW], st.counters[PERIOD], st.counters[ACTIVE]
     for j in range(count):
@@ -83,10 +83,10 @@ def _add_bodies(system, flows, st, rec, scratch, s, period, tau, count):
         for i in range(system.modes, len(st.q)):
             load = system.load[h, i].conjugate()
             if load != 0.0:
-                own = st.v[i]
+                rate = st.v[i]
                 for j in range(count):
-                    own -= (flows.velocity[s, i, j] * st.amplitude[j]).real
-                steady += load * own
+                    rate -= (flows.velocity[s, i, j] * st.amplitude[j]).real
+                steady += load * rate
                 rising += load * st.bend[i]
         if steady != 0.0 or rising != 0.0:
             st.ledger[EXCITATION] += turning_back(
@@ -97,7 +97,7 @@ def _add_bodies(system, flows, st, rec, scratch, s, period, tau, count):
 @kernel
 def _add_friction(system, flows, st, scratch, s, tau, count):
     """Add the losses of units that slip, and loss and impulse of compliant contacts."""
-    u, place = len(system.rest), 0
+    u, index = len(system.rest), 0
     st.ledger[FRICTION] += quadratic_form(flows.friction[s], st.change, scratch.total, count)
     for i in range(flows.slow_count[s]):
         if flows.slow[s, i, 2] >= SINGLE:
@@ -109,17 +109,17 @@ def _add_friction(system, flows, st, scratch, s, tau, count):
             taken = _friction_on_drift(system, flows, st, scratch, s, r, tau, count)
             st.ledger[FRICTION] += taken
         if compliant and st.state[r] < OPEN:
-            taken += quadratic_form(flows.lost[s, place], st.change, scratch.total, count)
+            taken += quadratic_form(flows.lost[s, index], st.change, scratch.total, count)
             for i in range(flows.slow_count[s]):
                 if flows.slow[s, i, 2] >= SINGLE:
                     break
-                taken += (flows.slow_lost[s, place, i] * slow_product(flows, st, s, i, tau)).real
+                taken += (flows.slow_lost[s, index, i] * slow_product(flows, st, s, i, tau)).real
             st.lost[r] += taken
             for row in (r, u + r):
                 st.pushed[row] += st.force[row] * tau
                 for j in range(count):
                     st.pushed[row] += (flows.force[s, row, j] * flows.inverse[s, j] * scratch.gain[j]).real
-        place += 1 if compliant else 0
+        index += 1 if compliant else 0
 
 
 @kernel
@@ -158,7 +158,7 @@ def _real_part(functional, amplitude, count):
 
 @inlined
 def _friction_on_drift(system, flows, st, scratch, s, r, tau, count):
-    """Return what the constant part of a unit's friction takes, and the rest of it on the linear part of its slip."""
+    """Return the loss by the constant part of a unit's friction, and the rest on the linear part of its slip."""
     row = len(system.rest) + r
     speed, drift = row_speed(system, row, st.v), row_speed(system, row, st.bend)
     shift, mean, slope = tau * (speed + 0.5 * tau * drift), 0.0, 0.0
@@ -211,9 +211,9 @@ def _pieces(system, flows, st, b, tau):
         rate, row = flows.eigenvalue[s, j], flows.motion[s, system.tilt[b], j]
         for i in range(len(st.q)):
             row -= system.turn[b, i] * flows.motion[s, i, j]
-        part, square = abs(row * st.amplitude[j]), rate.real * rate.real + rate.imag * rate.imag
-        size += part
-        fourth += part * (square * square)
+        term, square = abs(row * st.amplitude[j]), rate.real * rate.real + rate.imag * rate.imag
+        size += term
+        fourth += term * (square * square)
     fine = tau * math.sqrt(math.sqrt(fourth / (0.384 * size))) if size > 0.0 else 0.0
     return max(math.ceil(_PIECES * tau / system.period), min(math.ceil(fine), _MOST_PIECES), 1)
 
@@ -221,7 +221,7 @@ def _pieces(system, flows, st, b, tau):
 @kernel
 def _note_extremum(system, flows, st, rec, scratch, b, lo, low_rate, hi, high_rate, q, v):
     """Note the extremum of a tilt between two times with rates of opposite sign, by the rule of Illinois."""
-    slope, kept = abs(high_rate - low_rate) / (hi - lo), 0
+    slope, side = abs(high_rate - low_rate) / (hi - lo), 0
     for _ in range(_STEPS):
         t = lo + (hi - lo) * (low_rate / (low_rate - high_rate))
         move(system, flows, st, scratch, t, q, v)
@@ -231,12 +231,12 @@ def _note_extremum(system, flows, st, rec, scratch, b, lo, low_rate, hi, high_ra
             break
         if rate * high_rate > 0.0:
             hi, high_rate = t, rate
-            low_rate *= 0.5 if kept > 0 else 1.0
-            kept = 1
+            low_rate *= 0.5 if side > 0 else 1.0
+            side = 1
         else:
             lo, low_rate = t, rate
-            high_rate *= 0.5 if kept < 0 else 1.0
-            kept = -1
+            high_rate *= 0.5 if side < 0 else 1.0
+            side = -1
 
 
 @inlined
@@ -246,9 +246,9 @@ def response_at(system, q, v, time):
     for h in range(len(system.frequency)):
         if system.table[h] != 0.0:
             angle = system.frequency[h] * time
-            part = system.table[h] * complex(math.cos(angle), math.sin(angle))
-            x += part.real
-            rate -= system.frequency[h] * part.imag
+            base = system.table[h] * complex(math.cos(angle), math.sin(angle))
+            x += base.real
+            rate -= system.frequency[h] * base.imag
     for i in range(len(q)):
         x += system.response[i] * q[i]
         rate += system.response[i] * v[i]

@@ -79,12 +79,12 @@ def next_event(system, flows, st, watched):
         if grows > 1.0:  # bounds of the derivatives hold for motions that decay
             second, calm = second * grows, -1.0
             watched.expansion.taylor[0, DEGREE] *= grows
-        step, found, _ = step_or_stop(
+        step, is_root, _ = step_or_stop(
             watched.expansion, 1.0, watched.k0[k], math.inf, max(noise, watched.noise[k]), second, calm, fast,
             system.period, shortest,
         )  # fmt: skip
-        watched.status[k] = ROOT if found else EXPANDED
-        watched.no_root_before[k] = tau + step if found else max(watched.no_root_before[k], tau + step)
+        watched.status[k] = ROOT if is_root else EXPANDED
+        watched.no_root_before[k] = tau + step if is_root else max(watched.no_root_before[k], tau + step)
 
 
 @inlined
@@ -116,10 +116,10 @@ def _list_functions(system, flows, st, watched, s, grows):
 
 
 @kernel
-def _add(system, flows, st, watched, s, r, order, what, on_normal, on_slip, grows, k):
+def _add(system, flows, st, watched, s, r, order, event, on_normal, on_slip, grows, k):
     """Add an event function: a gap and its rate, a slip's speed, or forces of both rows, times these factors.
 
-    Returns the number of functions so far. One whose force never comes near its bound is left out.
+    Returns the number of functions so far. Those of forces far from their bounds are left out.
     """
     k0, k1, k2, noise = _polynomial(system, st, r, order, on_normal, on_slip)
     if st.state[r] == TOUCHING:  # as far as round-off of its gap may have it drift
@@ -134,7 +134,7 @@ def _add(system, flows, st, watched, s, r, order, what, on_normal, on_slip, grow
             g = on_normal * flows.force[s, r, j] + on_slip * flows.force[s, u + r, j]
         elif order == POSITION:
             g = flows.rows[s, r, j]
-            if what != CLOSES:  # which is the gap alone
+            if event != CLOSES:  # only the gap
                 k1 += on_slip * (g * st.amplitude[j] * rate * rate).real
                 g *= on_normal + on_slip * rate
         else:
@@ -160,7 +160,7 @@ def _add(system, flows, st, watched, s, r, order, what, on_normal, on_slip, grow
         return k
     first += k1
     second += k2 if order == POSITION else 0.0
-    watched.unit[k], watched.order[k], watched.what[k], watched.status[k] = r, order, what, BOUNDED
+    watched.unit[k], watched.order[k], watched.what[k], watched.status[k] = r, order, event, BOUNDED
     watched.k0[k], watched.k1[k], watched.k2[k], watched.no_root_before[k] = k0, k1, k2, 0.0
     watched.noise[k] = SUM_ROUND_OFF * (noise + swing)
     if _begins_at_zero(system, st, r, order, abs(on_normal), value, first, second_bound, noise + swing):
@@ -187,16 +187,16 @@ def _polynomial(system, st, r, order, on_normal, on_slip):
     elif order == POSITION:
         k0, noise = on_normal * system.rest[r], abs(on_normal * system.rest[r])
         for i in range(size):
-            part, speed = on_normal * system.J[r, i] * st.q[i], on_slip * system.J[r, i] * st.v[i]
-            k0 += part + speed
-            noise += abs(part) + abs(speed)
+            term, speed = on_normal * system.J[r, i] * st.q[i], on_slip * system.J[r, i] * st.v[i]
+            k0 += term + speed
+            noise += abs(term) + abs(speed)
             k1 += system.J[r, i] * (on_normal * st.v[i] + on_slip * st.bend[i])
             k2 += on_normal * system.J[r, i] * st.bend[i]
     else:
         for i in range(size):
-            part = on_slip * system.J[u + r, i] * st.v[i]
-            k0 += part
-            noise += abs(part)
+            term = on_slip * system.J[u + r, i] * st.v[i]
+            k0 += term
+            noise += abs(term)
             k1 += on_slip * system.J[u + r, i] * st.bend[i]
     return k0, k1, k2, noise
 
@@ -223,7 +223,7 @@ def _begins_at_zero(system, st, r, order, factor, value, first, second_bound, no
 def _first_step(period, first, second, third, second_bound, third_bound, fourth_bound):
     """A safe step of a function that begins at zero: by the first of its derivatives that is not round-off.
 
-    The decision of the contacts at this instant says that it rises.
+    By the contacts' decision it rises.
     """
     omega, step = 2.0 * math.pi / period, AT_START * period
     if first > FLAT * second_bound / omega:

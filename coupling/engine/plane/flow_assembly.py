@@ -1,4 +1,4 @@
-"""The exact flow of a subsystem at a frequency, in compiled code (plane.subsystems): a place of Flows."""
+"""The exact flow of a subsystem at a frequency, in compiled code (plane.subsystems): an index of PlanarFlows."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from vanedamp.coupling.system.unit_kinematics import has_friction, is_compliant,
 
 
 @record_with(free_axes=1)
-class Flows(NamedTuple):
+class PlanarFlows(NamedTuple):
     """Stack of the flows met so far, first axis s. m is the largest number of modes, the e harmonics included.
 
-    Forms, and what enters them, are those of line.subsystem_assembly.Flows; no mode is driven.
+    Forms and their inputs are those of line.subsystem_assembly.Flows; no mode is driven.
     """
 
     subsystem: Annotated[np.ndarray, "s", int]  # its number among the subsystems; 0: a free index
@@ -93,11 +93,11 @@ class Flows(NamedTuple):
     slow_lost: Annotated[np.ndarray, "s c pairs", complex]
 
 
-def empty_flows(system: System, capacity: int = 8) -> Flows:
+def empty_flows(system: System, capacity: int = 8) -> PlanarFlows:
     """Storage for `capacity` flows."""
     u, e, sprung = len(system.rest), len(system.frequency), np.isfinite(system.spring)
     m = e + 2 * most_stretches(system)
-    return room(Flows, {
+    return room(PlanarFlows, {
         "s": capacity, "u": u, "m": m, "N": len(system.mass), "e": e, "b": system.bodies, "phases": e + 1,
         "grids": GRIDS, "k": len(system.outputs), "maps": WORK_MAP + 4 * e, "c": int(sprung.sum()),
         "pairs": m * (m + 3),
@@ -105,7 +105,7 @@ def empty_flows(system: System, capacity: int = 8) -> Flows:
 
 
 @record
-class AssemblyScratch(NamedTuple):
+class PlanarAssemblyScratch(NamedTuple):
     """Space for intermediate results of `fill`."""
 
     wave: Annotated[np.ndarray, "q", complex]  # stretches of a harmonic
@@ -118,11 +118,11 @@ class AssemblyScratch(NamedTuple):
     forms: FormScratch
 
 
-def new_assembly_scratch(system: System) -> AssemblyScratch:
+def new_assembly_scratch(system: System) -> PlanarAssemblyScratch:
     """Return space to fill flows of a system."""
     q, size, u = most_stretches(system), len(system.mass), len(system.rest)
     m = len(system.frequency) + 2 * q
-    return room(AssemblyScratch, {"q": q, "N": size, "m": m}, forms=new_form_scratch(m, size, max(size, 2 * u)))
+    return room(PlanarAssemblyScratch, {"q": q, "N": size, "m": m}, forms=new_form_scratch(m, size, max(size, 2 * u)))
 
 
 @kernel
@@ -141,7 +141,7 @@ def is_in_states(system, subsystems, k, state):
 
 @entry
 def fill(system, subsystems, k, flows, s, scratch):
-    """Set place s of the flows, whatever it was before, to subsystem k under the excitation.
+    """Set index s of the flows to subsystem k under the excitation.
 
     Returns whether doubles resolve it: otherwise the spring of a friction damper is as good as rigid, a mode is too
     fast or too slow for the excitation, or this meets a resonance without damping.
@@ -176,7 +176,7 @@ def fill(system, subsystems, k, flows, s, scratch):
 
 @kernel
 def _respond(system, subsystems, k, h, scratch):
-    """Set the stretches in the steady state of harmonic h, and what it leaves of its loads. False at a resonance."""
+    """Set the stretches in the steady state of harmonic h, and the remainder of its loads. False at a resonance."""
     size, q, omega, x = len(system.mass), subsystems.stretches[k], system.frequency[h], scratch.wave
     for a in range(q):
         x[a] = 0.0
@@ -221,16 +221,16 @@ def _set_harmonic(system, subsystems, k, flows, s, h, scratch):
             follows += subsystems.follow[k, j, i] * moved[i]
         moved[size - sliders + j] = follows
     for i in range(size):
-        part = moved[i] / math.sqrt(system.mass[i])
-        flows.motion[s, i, h] = part if abs(moved[i]) > HELD_ROUND_OFF * terms else 0.0j
+        term = moved[i] / math.sqrt(system.mass[i])
+        flows.motion[s, i, h] = term if abs(moved[i]) > HELD_ROUND_OFF * terms else 0.0j
         flows.velocity[s, i, h] = turn * flows.motion[s, i, h]
     flows.eigenvalue[s, h] = turn
     for r in range(len(system.J)):
         move, most, force = 0.0j, 0.0, 0.0j
         for i in range(size):
-            part = system.J[r, i] * flows.motion[s, i, h]
-            move += part
-            most += abs(part)
+            term = system.J[r, i] * flows.motion[s, i, h]
+            move += term
+            most += abs(term)
             force += subsystems.carry[k, r, i] * net[i]
         for a in range(q):
             force += complex(subsystems.spring[k, r, a], omega * subsystems.dashpot[k, r, a]) * x[a]
@@ -250,7 +250,7 @@ def _set_harmonic(system, subsystems, k, flows, s, h, scratch):
 
 @kernel
 def _take_modes(system, subsystems, k, flows, s, count, scratch):
-    """Set the functionals of the subsystem's own modes, and of all of them what rows have."""
+    """Set the functionals of the subsystem's own modes, and the rows' parts of all."""
     e, size = len(system.frequency), len(system.mass)
     for i in range(count):
         j, rate = e + i, subsystems.eigenvalue[k, i]
@@ -278,7 +278,7 @@ def _take_modes(system, subsystems, k, flows, s, count, scratch):
 
 @kernel
 def _take_constants(system, subsystems, k, flows, s):
-    """Set what the excitation does not change."""
+    """Set what does not depend on the excitation."""
     u, size, flows.holds[s] = len(system.rest), len(system.mass), subsystems.holds[k]
     for r in range(u):
         flows.key[s, r], flows.held[s, r] = subsystems.state[k, r], subsystems.held[k, r]
@@ -300,7 +300,7 @@ def _take_constants(system, subsystems, k, flows, s):
 
 @kernel
 def _set_units(system, flows, s, m):
-    """Set what units do, and how bodies move in their cavities."""
+    """Set the units' parts, and how bodies move in their cavities."""
     flows.damped[s], flows.rubs[s] = False, False
     for r in range(len(system.rest)):
         pressed = is_compliant(system, r) and flows.key[s, r] < OPEN
@@ -315,14 +315,14 @@ def _set_units(system, flows, s, m):
         for j in range(m + 1 + len(system.mass) if system.tilt[b] >= 0 else 0):
             tilt, terms = 0.0j, 0.0
             for i in range(len(system.mass)):
-                part = flows.bend[s, i] + 0.0j
+                term = flows.bend[s, i] + 0.0j
                 if j < m:
-                    part = flows.motion[s, i, j]
+                    term = flows.motion[s, i, j]
                 elif j > m:
-                    part = flows.bend_held[s, i, j - m - 1] + 0.0j
-                part *= (1.0 if i == system.tilt[b] else 0.0) - system.turn[b, i]
-                tilt += part
-                terms += abs(part)
+                    term = flows.bend_held[s, i, j - m - 1] + 0.0j
+                term *= (1.0 if i == system.tilt[b] else 0.0) - system.turn[b, i]
+                tilt += term
+                terms += abs(term)
             flows.rocks[s, b] = flows.rocks[s, b] or abs(tilt) > CANCELLED * terms
 
 
@@ -335,39 +335,39 @@ def _slides(system, flows, s, r):
 @kernel
 def _set_energies(system, flows, s, m, scratch):
     """Set the antiderivatives of the energies' terms for m complex modes, whose functionals are set."""
-    u, size, forms, place, width = len(system.rest), len(system.mass), scratch.forms, 0, 0
+    u, size, forms, index, width = len(system.rest), len(system.mass), scratch.forms, 0, 0
     set_linear(system, flows, s, m, forms)
     pairs = invert_rates(flows, s, m, system.period, forms)
-    for what in range(5 + len(system.rest)):  # one place only, which is compiled once
-        if what == 0:
+    for energy in range(5 + len(system.rest)):  # here only: compiled once
+        if energy == 0:
             form, slow = flows.loss[s], flows.slow_loss[s]
             split(forms.speed[:m], forms.left)
             for j in range(m):
                 forms.span[j, 0], forms.span[j, 1] = 0, size
             damp(system.damping, forms.left, forms.right, forms.span, m, size, False)
-        elif what == 1:
+        elif energy == 1:
             form, slow = flows.square[s], flows.slow_square[s]
             take_factor(flows.response[s], flows.response[s], 1.0, 0, m, forms)
-        elif what == 2:
+        elif energy == 2:
             if not flows.rubs[s]:
                 break
             form, slow = flows.dashpot[s], flows.slow_dashpot[s]
             for r in range(u):
                 width = _take_dashpot(system, flows, s, r, m, scratch, width)
-        elif what == 3:
+        elif energy == 3:
             form, slow, width = flows.friction[s], flows.slow_friction[s], 0
             for r in range(u):
                 width = _take_friction(system, flows, s, r, m, scratch, width)
-        elif what - 4 < u:
-            r = what - 4
+        elif energy - 4 < u:
+            r = energy - 4
             if not is_compliant(system, r):
                 continue
-            form, slow = flows.lost[s, place], flows.slow_lost[s, place]
-            width, place = _take_dashpot(system, flows, s, r, m, scratch, 0), place + 1
+            form, slow = flows.lost[s, index], flows.slow_lost[s, index]
+            width, index = _take_dashpot(system, flows, s, r, m, scratch, 0), index + 1
             width = _take_friction(system, flows, s, r, m, scratch, width)
         else:
             break
-        if what > 1 and width == 0:
+        if energy > 1 and width == 0:
             form[: 2 * m, : 2 * m], slow[:pairs] = 0.0, 0.0
             continue
         set_form(flows, s, m, forms, form, slow, pairs)
@@ -377,25 +377,25 @@ def _set_energies(system, flows, s, m, scratch):
 
 
 @kernel
-def _take_dashpot(system, flows, s, r, m, scratch, place):
-    """Take the power of the dashpot of a contact as factor `place` of products. Returns how many there are."""
+def _take_dashpot(system, flows, s, r, m, scratch, index):
+    """Take the power of the dashpot of a contact as factor `index` of products. Returns how many there are."""
     if not (is_compliant(system, r) and flows.key[s, r] < OPEN):
-        return place
+        return index
     for j in range(m):
         scratch.push[j] = flows.rows[s, r, j] * flows.eigenvalue[s, j]
-    take_factor(scratch.push, scratch.push, system.dashpot[r], place, m, scratch.forms)
-    return place + 1
+    take_factor(scratch.push, scratch.push, system.dashpot[r], index, m, scratch.forms)
+    return index + 1
 
 
 @kernel
-def _take_friction(system, flows, s, r, m, scratch, place):
+def _take_friction(system, flows, s, r, m, scratch, index):
     """Take the power of the friction of a unit, in both orders, as two factors. Returns how many there are."""
     if not _slides(system, flows, s, r):
-        return place
+        return index
     row = len(system.rest) + r
     for j in range(m):
         scratch.slip[j] = flows.rows[s, row, j] * flows.eigenvalue[s, j]
         scratch.drag[j] = flows.force[s, row, j]
-    take_factor(scratch.slip, scratch.drag, -0.5, place, m, scratch.forms)
-    take_factor(scratch.drag, scratch.slip, -0.5, place + 1, m, scratch.forms)
-    return place + 2
+    take_factor(scratch.slip, scratch.drag, -0.5, index, m, scratch.forms)
+    take_factor(scratch.drag, scratch.slip, -0.5, index + 1, m, scratch.forms)
+    return index + 2

@@ -21,7 +21,7 @@ _NORMAL, _RIGHT, _LEFT, _SPEED = 1, 3, 4, 5
 def solve_rows(system, scratch, count, right, least, bound):
     """Solve the problem of the listed units: accelerations (or speeds) right + G forces, forces in scratch.impulse.
 
-    right: (2u,) without the unknown forces; least: what they are to be measured by, at least, per root of the
+    right: (2u,) without the unknown forces; least: their least scale, per root of the
     diagonal of G; bound: (u,) of friction, to which mu times the unknown normal force is added. Returns False if there
     is no solution, or none is found.
     """
@@ -92,11 +92,11 @@ def _set_up(system, scratch, count, right, bound, scale, size):
                 weight = 1.0 / math.sqrt(system.delassus[c, c])
                 drag = -system.friction[c] * (1.0 if free else float(scratch.way[o]))
                 if contact:
-                    part = system.delassus[r, c] + drag * system.delassus[r, u + c]
-                    problem.matrix[i, j] += normal * weight * part
+                    entry = system.delassus[r, c] + drag * system.delassus[r, u + c]
+                    problem.matrix[i, j] += normal * weight * entry
                 if at_rest:
-                    part = system.delassus[u + r, c] + drag * system.delassus[u + r, u + c]
-                    problem.matrix[first, j] += slip * weight * part
+                    entry = system.delassus[u + r, c] + drag * system.delassus[u + r, u + c]
+                    problem.matrix[first, j] += slip * weight * entry
             if free:
                 k = j + 1 if other else j
                 weight = 1.0 / math.sqrt(system.delassus[u + c, u + c])
@@ -202,7 +202,7 @@ def _take_split(scratch, many, size):
 
 @inlined
 def _loaded(system, scratch, count, right, bound, row):
-    """What a row has without the unknowns: friction counts from its lower bound."""
+    """The right side of a row: friction counts from its lower bound."""
     u, total = len(system.rest), right[row]
     for p in range(count):
         c = scratch.listed[p]

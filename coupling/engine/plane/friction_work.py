@@ -1,4 +1,4 @@
-"""Work of friction of each unit in a segment, by quadrature to round-off: an independent check of the ledger's total.
+"""Work of friction of each unit in a segment, by quadrature to round-off: an independent check of the total.
 
 The force on a contact's normal row times its slip is a product of sums of exponentials. Gauss's rule on pieces that
 are short for the fastest mode has their integral to round-off, without a form for every unit and subsystem.

@@ -4,7 +4,7 @@ Newton's law in Moreau's form (Moreau 1988): after the impact v_N + k v_N- >= 0 
 other, and P_T stays within Coulomb's cone, at its edge where the contact still slips. Without friction one
 coefficient for all contacts never brings energy; with friction, or with several coefficients, the law can (Kane's
 paradox). Then all coefficients are smaller by one factor, the largest that brings none; it is zero for a wedged block
-whose contacts cannot part. One contact alone, of mobility G, brings none up to k = sqrt(1 - G_NT^2/(G_NN G_TT)).
+whose contacts cannot part. A single contact of mobility G, brings none up to k = sqrt(1 - G_NT^2/(G_NN G_TT)).
 
 Poisson's law (Glocker and Pfeiffer 1995) is two such problems: one of compression, without restitution, and one of
 expansion, in which P_N exceeds k times that of compression only where v_N+ would be negative.
@@ -47,7 +47,7 @@ from vanedamp.coupling.system.unit_kinematics import (
 _HALVINGS = 40
 #: least length of a flight that is not ended, times CHATTER, however elastic it is
 _SHORTEST_FLIGHT = 0.1
-#: what a closed contact does in a short step: it pushes, or its slip turns without
+#: a closed contact in a short step: it pushes, or its slip turns without
 _PUSHES, _TURNS = 1, 2
 #: how much more than the loads the forces of other contacts may press
 _FAR = 100.0
@@ -81,7 +81,7 @@ def collide(system, st, rec, scratch):
 
 @inlined
 def _list_closed(system, st, scratch):
-    """List the contacts whose gaps are zero. Returns how many they are."""
+    """List the contacts whose gaps are zero. Returns their count."""
     count = ZERO
     for r in range(system.contacts):
         if is_rigid(system, r) and is_closed(system, st, r):
@@ -107,7 +107,7 @@ def _solve_restitution(system, st, scratch, count, factor, tiny):
 
 @kernel
 def _set_speeds(system, scratch, speed, tiny):
-    """Set the speeds of all rows (scratch.speed), those of gaps without their round-off."""
+    """Set the speeds of all rows (scratch.speed), of gaps without their round-off."""
     for row in range(len(speed)):
         scratch.speed[row] = speed[row] if row >= len(system.rest) or abs(speed[row]) > tiny else 0.0
 
@@ -160,7 +160,7 @@ def _restitution(system, st, scratch, r):
 
 @inlined
 def _adds_energy(system, st, scratch):
-    """Whether the impulses add more energy than round-off of what there is.
+    """Whether the impulses add more energy than round-off.
 
     By the velocities that they change: of a wedged block, large impulses nearly balance each other.
     """
@@ -181,9 +181,9 @@ def _push(system, scratch):
     for row in range(len(scratch.impulse)):
         if scratch.impulse[row] != 0.0:
             for i in range(len(scratch.free)):
-                part = system.J[row, i] * scratch.impulse[row]
-                scratch.free[i] += part
-                scratch.terms[i] += abs(part)
+                term = system.J[row, i] * scratch.impulse[row]
+                scratch.free[i] += term
+                scratch.terms[i] += abs(term)
 
 
 @kernel
@@ -238,7 +238,7 @@ def log_event(system, st, rec, kind, r, before, after, normal, tangential, loss)
 def _complete_chatter(system, st, scratch, count, tiny):
     """Stop contacts that would part for less than CHATTER: those that push in a step of that length.
 
-    The step is one of Moreau's scheme, and one for all of them: over steps of several lengths the forces of contacts at
+    The step is one of Moreau's scheme, and one for all: over steps of several lengths the forces of contacts at
     rest would push others more, or less, than they do. A chatter takes 1/(1 - k) times its next flight. Returns False
     if that cannot be decided.
     """
@@ -326,33 +326,33 @@ def _short_step(system, st, scratch, count, fraction):
 def _stop(system, st, scratch, count, tiny, slow, most):
     """Stop contacts that push or turn (scratch.slips), with their slips if they stick, and whom that drives together.
 
-    most: fraction of its bound below which friction counts as that of a contact that sticks.
+    most: fraction of its bound below which friction counts as sticking.
     """
-    u, found, before = len(system.rest), 0, _kinetic(system, st)
+    u, rank, before = len(system.rest), 0, _kinetic(system, st)
     for p in range(count):
         r = scratch.listed[p]
         normal = scratch.impulse[r]
         if scratch.slips[p] != 0:
-            found = _stop_row(system, st, scratch, r, found)
+            rank = _stop_row(system, st, scratch, r, rank)
             sticks = scratch.slips[p] == _TURNS or abs(scratch.impulse[u + r]) < most * system.friction[r] * normal
             if sticks and abs(row_speed(system, u + r, st.v)) < slow:
-                found = _stop_row(system, st, scratch, u + r, found)
-    _stop_driven(system, st, scratch, count, tiny, found, before)
+                rank = _stop_row(system, st, scratch, u + r, rank)
+    _stop_driven(system, st, scratch, count, tiny, rank, before)
 
 
 @inlined
-def _stop_driven(system, st, scratch, count, tiny, found, before):
-    """Stop closed contacts that approach as others have been stopped, and enter what all that takes.
+def _stop_driven(system, st, scratch, count, tiny, rank, before):
+    """Stop closed contacts that approach after others have been stopped, and enter the loss.
 
-    found: number of directions stopped; before: kinetic energy before that.
+    rank: number of directions stopped; before: kinetic energy before that.
     """
-    again = found > 0
+    again = rank > 0
     while again:
         again = False
         for p in range(count):
             if row_speed(system, scratch.listed[p], st.v) < -tiny:
-                more = _stop_row(system, st, scratch, scratch.listed[p], found)
-                again, found = again or more > found, more
+                more = _stop_row(system, st, scratch, scratch.listed[p], rank)
+                again, rank = again or more > rank, more
     st.ledger[IMPACT_LOSS] += before - _kinetic(system, st)
 
 
@@ -362,7 +362,7 @@ def _stop_round_off(system, st, scratch, count):
 
     Otherwise the last bits would decide which of them separate or slip, and which way, until they turn at once.
     """
-    u, found, terms, before = len(system.rest), 0, 0.0, _kinetic(system, st)
+    u, rank, terms, before = len(system.rest), 0, 0.0, _kinetic(system, st)
     for p in range(count):
         for row in (scratch.listed[p], u + scratch.listed[p]):
             total = 0.0
@@ -376,8 +376,8 @@ def _stop_round_off(system, st, scratch, count):
         r = scratch.listed[p]
         for row in (r, u + r):
             if abs(row_speed(system, row, st.v)) <= noise and (row == r or has_friction(system, r)):
-                found = _stop_row(system, st, scratch, row, found)
-    _stop_driven(system, st, scratch, count, tiny, found, before)
+                rank = _stop_row(system, st, scratch, row, rank)
+    _stop_driven(system, st, scratch, count, tiny, rank, before)
 
 
 @inlined
@@ -390,13 +390,13 @@ def _kinetic(system, st):
 
 
 @inlined
-def _stop_row(system, st, scratch, row, found):
+def _stop_row(system, st, scratch, row, rank):
     """Take a row's speed out of the velocities, and keep it stopped. Returns the number of directions stopped."""
-    more = extend_basis(system, scratch, row, found)
-    if more > found:
-        part = 0.0
+    more = extend_basis(system, scratch, row, rank)
+    if more > rank:
+        speed = 0.0
         for i in range(len(st.v)):
-            part += scratch.span[found, i] * math.sqrt(system.mass[i]) * st.v[i]
+            speed += scratch.span[rank, i] * math.sqrt(system.mass[i]) * st.v[i]
         for i in range(len(st.v)):
-            st.v[i] -= scratch.span[found, i] * part / math.sqrt(system.mass[i])
+            st.v[i] -= scratch.span[rank, i] * speed / math.sqrt(system.mass[i])
     return more

@@ -20,13 +20,13 @@ from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.plane import Plane, plane_of
 from vanedamp.coupling.response.records import IMPACT, IMPACT_LOSS, WIDTH, Records
 from vanedamp.coupling.response.restart_state import RestartState
-from vanedamp.coupling.response.segment import START, Begun, Event, Segment, no_event
+from vanedamp.coupling.response.segment import START, Begun, Segment, SegmentEnd, no_event
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.system.system import System
 
 
 def is_common(system: System, modes: int) -> bool:
-    """Whether this is the most common scene, for whose lengths the engine is compiled.
+    """Whether this is the most common scene, with lengths compiled in.
 
     One mode, one block between rigid walls, one harmonic.
     """
@@ -36,7 +36,7 @@ def is_common(system: System, modes: int) -> bool:
 
 
 class PlanarRun(EventDrivenRun):
-    """A run of bodies in the plane."""
+    """A run of planar bodies."""
 
     NUMBERS: ClassVar = EventDrivenRun.NUMBERS | {"reduced_impacts": REDUCED}
     rows_of: ClassVar = staticmethod(rows_of_units)
@@ -60,7 +60,7 @@ class PlanarRun(EventDrivenRun):
     def columns_of(
         self, scene: Scene, start: RestartState, values: Mapping[str, np.ndarray]
     ) -> tuple[Columns, Iterable[int]]:
-        """Return the columns of scenes, as EventDrivenRun says."""
+        """Return the columns of scenes (EventDrivenRun)."""
         return columns(scene, self.whole, start, values)
 
     def whole_in(self, table: Columns, k: int) -> System:
@@ -92,13 +92,13 @@ class PlanarRun(EventDrivenRun):
             force_shape=flows.force[s, :, modes].copy(), drive=none, driver=none, open_force=st.prestress.copy(),
         )  # fmt: skip
 
-    def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, Event]:
+    def _event(self, log: list[np.ndarray], since: Begun) -> tuple[float, SegmentEnd]:
         system, st, watched = self.system, self.state, self.watched
-        unit, what, elapsed, u = -1, 0, 0.0, len(system.rest)
+        unit, event, elapsed, u = -1, 0, 0.0, len(system.rest)
         if since is not START:
             roots = np.flatnonzero(watched.status == ROOT)
             first = roots[np.argmin(watched.no_root_before[roots])]
-            unit, what = int(watched.unit[first]), int(watched.what[first])
+            unit, event = int(watched.unit[first]), int(watched.what[first])
             elapsed = float(st.time[0]) - since.time
         hits = np.concatenate([*log, np.zeros((0, WIDTH))])
         hits = hits[hits[:, 1] == IMPACT]
@@ -108,7 +108,7 @@ class PlanarRun(EventDrivenRun):
         if system.two_phases and len(struck):
             compression = self.scratch.compression.copy()
         return elapsed, no_event(system)._replace(
-            unit=unit, what=what, impulse=impulse, compression=compression, struck=struck, before=hits[:, 3],
+            unit=unit, what=event, impulse=impulse, compression=compression, struck=struck, before=hits[:, 3],
             after=hits[:, 4], loss=float(st.ledger[IMPACT_LOSS]) - since.loss,
             reduced=int(st.counters[REDUCED]) > since.reduced,
         )  # fmt: skip

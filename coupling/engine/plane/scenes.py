@@ -1,4 +1,4 @@
-"""Runs of bodies in the plane in one compiled call (engine.scenes)."""
+"""Runs of planar bodies in one compiled call (engine.scenes)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _fill_known(system, subsystems, st, flows, assembly):
 
 @kernel
 def _take_numbers(columns, base, flows, setup, measured, k, linked):
-    """Set what differs between scenes (engine.scenes.take_numbers); friction, limits and rests enter flows, too."""
+    """Set the scenes' differences (engine.scenes.take_numbers); friction, limits and rests enter flows, too."""
     same = copy(base.rest, columns.rest[k])
     same = copy(base.friction, columns.friction[k]) and same
     same = copy(base.limit, columns.limit[k]) and same
@@ -56,9 +56,9 @@ def _take_numbers(columns, base, flows, setup, measured, k, linked):
 
 @kernel
 def _is_outside(system, st, columns, k, linked, left):
-    """Return whether scene k begins beyond a wall or a stop: it is to be moved, or refused, by Python.
+    """Return whether scene k begins beyond a wall or a stop: Python moves or rejects it.
 
-    left: the number of the scene that has left the state of a linked one; as long as there is none, Python says how
+    left: the number of the scene that has left the state of a linked one; while there is none, Python says how
     a scene begins.
     """
     if linked and k > 0 and left == 0:
@@ -98,12 +98,12 @@ def _leave(system, flows, st, scratch, columns, k):
 
 @kernel
 def _relative(carrier, st, x):
-    """Return place and rate of coordinate x relative to what carries it (N,)."""
-    place, rate = st.q[x], st.v[x]
+    """Return position and rate of coordinate x relative to its carrier (N,)."""
+    position, rate = st.q[x], st.v[x]
     for i in range(len(carrier)):
-        place -= carrier[i] * st.q[i]
+        position -= carrier[i] * st.q[i]
         rate -= carrier[i] * st.v[i]
-    return place, rate
+    return position, rate
 
 
 @strict
@@ -119,11 +119,11 @@ def _set_start(system, st, watched, columns, k):
     A spring that is compressed pushes, or lags behind the body that leaves it.
     """
     n, size, sliders = system.modes, len(st.q), len(system.tangential)
-    for part in (
+    for array in (
         st.time, st.q, st.v, st.rate, st.scale, st.pushed, st.lost, st.ledger, st.change, st.offset, st.bend, st.force,
         st.prestress,
     ):  # fmt: skip
-        part[:] = 0.0
+        array[:] = 0.0
     st.counters[:], st.fresh[:], st.amplitude[:], watched.status[:] = 0, 0, 0.0, 0
     st.other[:], st.known[:], st.last_impact[:] = OPEN, OPEN, -math.inf
     for i in range(n):
@@ -152,9 +152,9 @@ def _set_start(system, st, watched, columns, k):
 
 
 @strict
-def _place(carrier, st, n, x, place, rate):
-    """Set coordinate x from its place and rate relative to what carries it, in n modes."""
+def _place(carrier, st, n, x, position, rate):
+    """Set coordinate x from its position and rate relative to its carrier, in n modes."""
     for i in range(n):
-        place += carrier[i] * st.q[i]
+        position += carrier[i] * st.q[i]
         rate += carrier[i] * st.v[i]
-    st.q[x], st.v[x] = place, rate
+    st.q[x], st.v[x] = position, rate

@@ -15,7 +15,7 @@ from vanedamp.coupling.system.system import System
 
 
 @record
-class State(NamedTuple):
+class PlanarState(NamedTuple):
     """The state at the start of a segment."""
 
     # changes all the time
@@ -48,7 +48,7 @@ class State(NamedTuple):
 
 
 @record
-class EventFunctions(NamedTuple):
+class PlanarEventFunctions(NamedTuple):
     """The event functions of a segment."""
 
     unit: np.ndarray  # (k,) int
@@ -67,7 +67,7 @@ class EventFunctions(NamedTuple):
 
 
 @record
-class Scratch(NamedTuple):
+class PlanarScratch(NamedTuple):
     """Space for intermediate results."""
 
     free: np.ndarray  # (N,) acceleration without contact forces
@@ -108,10 +108,10 @@ class Scratch(NamedTuple):
     drive: np.ndarray  # (m,) complex
 
 
-def new_state(system: System, modes: int) -> State:
+def new_state(system: System, modes: int) -> PlanarState:
     """Return room for the state."""
     u, size = len(system.rest), len(system.mass)
-    return State(
+    return PlanarState(
         counters=np.zeros(COUNTERS, np.int64), time=np.zeros(1), q=np.zeros(size), v=np.zeros(size),
         state=np.full(u, OPEN), other=np.full(u, OPEN), known=np.full(u, OPEN), fresh=np.zeros(u, np.int64),
         rate=np.zeros(2 * u), scale=np.zeros(1), reach=np.abs(system.J).max(axis=0, initial=0.0),
@@ -123,21 +123,21 @@ def new_state(system: System, modes: int) -> State:
     )  # fmt: skip
 
 
-def new_event_functions(system: System, modes: int) -> EventFunctions:
+def new_event_functions(system: System, modes: int) -> PlanarEventFunctions:
     """Return storage for three event functions per unit."""
     k = 3 * len(system.rest)
-    return EventFunctions(
+    return PlanarEventFunctions(
         unit=np.zeros(k, np.int64), order=np.zeros(k, np.int64), what=np.zeros(k, np.int64),
         status=np.zeros(k, np.int64), k0=np.zeros(k), k1=np.zeros(k), k2=np.zeros(k), noise=np.zeros(k),
         no_root_before=np.zeros(k), g=np.zeros((k, modes), complex), expansion=new_expansion(modes),
     )  # fmt: skip
 
 
-def new_scratch(system: System, modes: int) -> Scratch:
+def new_scratch(system: System, modes: int) -> PlanarScratch:
     """Return scratch space for a scene."""
     u, size = len(system.rest), len(system.mass)
     integers, waves = iter(np.zeros((11, u), np.int64)), iter(np.zeros((7, modes), complex))
-    return Scratch(
+    return PlanarScratch(
         free=np.zeros(size), terms=np.zeros(size), later=np.zeros((2, size)), speed=np.zeros(2 * u),
         before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), compression=np.zeros(2 * u), compressed=np.zeros(2 * u),
         least=np.zeros(u), bound=np.zeros(u), before=next(integers), listed=next(integers),

@@ -1,4 +1,4 @@
-"""The subsystems of bodies in the plane, by the states of their units: all that no frequency or force changes.
+"""The subsystems of planar bodies, by the states of their units: all that no frequency or force changes.
 
 The forces of closed contacts keep their gaps (and the slips of those that stick) at zero: they are linear in what
 presses on them, with the friction of slipping ones in the direction of their normal forces, W_N - sigma mu W_T, so that
@@ -28,17 +28,17 @@ from vanedamp.coupling.system.flow import HELD_ROUND_OFF, StateFlow
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.unit_laws import SINGULAR
 
-#: parts of a system that decide its subsystems, beside friction of what slips and gaps of springs that push
+#: parts of a system that decide its subsystems, with friction of what slips and gaps of springs that push
 _DECIDING = (
     "mass", "stiffness", "damping", "J", "spring", "dashpot", "elongation", "tangential", "weight", "contacts",
 )  # fmt: skip
 
 
 @record_with(free_axes=1)
-class Subsystems(NamedTuple):
+class PlanarSubsystems(NamedTuple):
     """Stack of subsystems, first axis k: q stretches, m complex modes at most; other sizes as in System."""
 
-    number: Annotated[np.ndarray, "k", int]  # in the order in which they were found, of all systems; 0: a free index
+    number: Annotated[np.ndarray, "k", int]  # in the order they were found, of all systems; 0: a free index
     state: Annotated[np.ndarray, "k u", int]
     slips: Annotated[np.ndarray, "k u", bool]  # whether friction enters
     friction: Annotated[np.ndarray, "k u"]  # of those
@@ -59,7 +59,7 @@ class Subsystems(NamedTuple):
 
     # motions and forces by loads
     oblique: Annotated[np.ndarray, "k N N"]  # accelerations
-    follow: Annotated[np.ndarray, "k j N"]  # sliders by what draws them
+    follow: Annotated[np.ndarray, "k j N"]  # sliders by their drivers
     carry: Annotated[np.ndarray, "k 2u N"]  # forces of rows at rest
     spring: Annotated[np.ndarray, "k 2u q"]  # forces by stretches
     dashpot: Annotated[np.ndarray, "k 2u q"]  # and by their rates
@@ -85,10 +85,10 @@ class Subsystems(NamedTuple):
     coalescing: Annotated[np.ndarray, "k", bool]
 
 
-def empty_subsystems(system: System, capacity: int | None = None) -> Subsystems:
+def empty_subsystems(system: System, capacity: int | None = None) -> PlanarSubsystems:
     """Return storage for `capacity` subsystems of a system."""
     q = most_stretches(system)
-    return room(Subsystems, {
+    return room(PlanarSubsystems, {
         "k": capacity or 8, "u": len(system.rest), "N": len(system.mass), "j": len(system.tangential), "q": q,
         "m": 2 * q,
     })  # fmt: skip
@@ -110,8 +110,8 @@ def most_stretches(system: System) -> int:
     return len(_stretched(system, np.vstack([system.J[: len(sprung)][sprung], system.elongation])))
 
 
-def _same(stack: Subsystems, system: System, state: np.ndarray) -> np.ndarray:
-    """Return which places (k,) are of the states (u,) in a system."""
+def _same(stack: PlanarSubsystems, system: System, state: np.ndarray) -> np.ndarray:
+    """Return which entries (k,) have states (u,) in a system."""
     friction = ~stack.slips | ((stack.friction == system.friction) & (stack.limit == system.limit))
     rest = ~stack.pressed | (stack.rest == system.rest)
     return np.asarray(((stack.state == state) & friction & rest).all(axis=1))
@@ -139,15 +139,15 @@ def _projectors(flow: StateFlow) -> dict[str, Any]:
     u, rows, root, kept, touching = flow.u, flow.rows, flow.root, flow.kept, flow.touching
     self_stress, close_gaps = np.zeros((2 * u, 2 * u)), np.zeros((len(root), u))
     stop_rows = np.zeros((len(root), 2 * u))
-    if len(kept) > 1:  # one force alone balances none
+    if len(kept) > 1:  # a single force balances none
         lever = np.linalg.norm(flow.wrench, axis=0)
         balanced = null_space(flow.wrench / lever, rcond=SINGULAR)
         self_stress[:, kept] = flow.spread(balanced @ balanced.T / lever[:, None] * lever)
     stopped = np.concatenate([touching, u + flow.stick])
     if len(stopped):
         inverse = flow.inverse if len(kept) == len(stopped) else np.linalg.pinv(rows[stopped], rcond=SINGULAR)
-        own = inverse if len(touching) == len(stopped) else np.linalg.pinv(rows[touching], rcond=SINGULAR)
-        stop_rows[:, stopped], close_gaps[:, touching] = inverse / root[:, None], own / root[:, None]
+        of_touching = inverse if len(touching) == len(stopped) else np.linalg.pinv(rows[touching], rcond=SINGULAR)
+        stop_rows[:, stopped], close_gaps[:, touching] = inverse / root[:, None], of_touching / root[:, None]
     return {
         "self_stress": self_stress, "close_gaps": close_gaps, "stop_rows": stop_rows, "held": flow.held,
         "holds": len(stopped) > 0,
@@ -167,7 +167,7 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
     basis = _stretched(system, np.vstack([system.J[pressed], system.elongation[holds]]))
     allowed = np.eye(len(basis))
     if len(basis) and len(constraints):
-        # both are orthonormal: singular values are sines, and what constraints hold has none above round-off
+        # both are orthonormal: singular values are sines, and constrained directions have none above round-off
         turned, sine, _ = np.linalg.svd(basis @ null_space(constraints, rcond=SINGULAR), full_matrices=False)
         allowed = turned[:, sine > SINGULAR]
     k = allowed.shape[1]
@@ -175,7 +175,7 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
     held[np.abs(held) < HELD_ROUND_OFF] = 0.0
     inner = allowed.T @ basis  # eta = inner sqrt(M) q
     inner[:, size - sliders :] = 0.0  # sliders rest, or follow
-    own, loss = (inner @ oblique @ part @ inner.T for part in (stiffness, damping))
+    own, loss = (inner @ oblique @ matrix @ inner.T for matrix in (stiffness, damping))
     eigenvalue, shape, project = _modes(own, loss)
     order = np.argsort(np.abs(eigenvalue), kind="stable")
     rate, shape, project = eigenvalue[order], shape[:, order], project[order]

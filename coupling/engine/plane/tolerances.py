@@ -1,6 +1,6 @@
-"""Tolerances of the engine for planar bodies. Every comment says what the number is multiplied by.
+"""Tolerances of the engine for planar bodies. Comments say what each multiplies.
 
-Those that other layers share are in numerics.tolerances. `play` is the system's scale of each gap.
+Those of other layers are in numerics.tolerances. `play` is the system's scale of each gap.
 """
 
 from __future__ import annotations

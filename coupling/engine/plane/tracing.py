@@ -1,4 +1,4 @@
-"""What a course says of a run of bodies in the plane (engine.trace)."""
+"""The course of a run of planar bodies (engine.trace)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Which states of the units are possible after an event, by trying them.
 
 States are right if no event function turns negative: of a quantity that is zero now, the first derivative that is not
-zero decides. The search repairs one state after the other, and tries all of them in turn where that goes round in
+zero decides. The search repairs one state after the other, and tries all in turn where that goes round in
 circles (Glocker and Pfeiffer 1996 solve the same by complementarity).
 """
 
@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from vanedamp.coupling.methods.scipy_ivp.motion import Motion, States, Unforced, Wrong
+from vanedamp.coupling.methods.scipy_ivp.motion import LinearMotion, States, Unforced, Wrong
 from vanedamp.coupling.numerics.codes import LEAVING, OPEN, SLIP_LEFT, SLIP_RIGHT, STICK
 from vanedamp.coupling.system.unit_laws import presses, slip_towards
 
@@ -26,7 +26,7 @@ Found = TypeVar("Found")
 def search(
     options: Sequence[Sequence[int]], begin: Sequence[int], judge: Callable[[States], tuple[Found, list[Wrong]] | None]
 ) -> Found | None:
-    """Return the result of `judge` for the first states that it accepts; None if there are none.
+    """Return the result of `judge` for the first states that it accepts; None without.
 
     options: the states that each unit may have; begin: those to begin with. `judge` returns None where the states are
     impossible.
@@ -37,9 +37,9 @@ def search(
         judged = judge(at)
         if judged is None:
             break
-        found, wrong = judged
+        solution, wrong = judged
         if not wrong:
-            return found
+            return solution
         unit, state = wrong[0]
         if state not in options[unit]:
             pressed = presses(state)
@@ -63,9 +63,9 @@ def _around(options: Sequence[Sequence[int]], begin: Sequence[int]) -> Iterator[
 
 
 def decide(
-    free: Unforced, motions: Callable[[States], Motion], now: np.ndarray, sizes: np.ndarray, present: np.ndarray,
+    free: Unforced, motions: Callable[[States], LinearMotion], now: np.ndarray, sizes: np.ndarray, present: np.ndarray,
     slow: float,
-) -> tuple[Motion, np.ndarray] | None:  # fmt: skip
+) -> tuple[LinearMotion, np.ndarray] | None:  # fmt: skip
     """Return the motion that begins at an extended state (extent,), and the orders of its event functions' zeros.
 
     None if no states are possible. Negligible gaps and speeds are zero. motions: the motion of states; sizes:
@@ -86,7 +86,7 @@ def decide(
         options.append(ways)
         begin.append(int(present[r]) if present[r] in ways else ways[0])
 
-    def judge(states: States) -> tuple[tuple[Motion, np.ndarray], list[Wrong]] | None:
+    def judge(states: States) -> tuple[tuple[LinearMotion, np.ndarray], list[Wrong]] | None:
         motion = motions(states)
         if not motion.possible:
             return None

@@ -18,7 +18,7 @@ _SWEEPS, _CONVERGED, _NEARLY = 200, 1e-9, 1e-6
 _HALVINGS = 50
 
 
-class Impact(NamedTuple):
+class ImpactSolution(NamedTuple):
     """Impulses (2u,), velocities (N,) after them, and the states (u,) of the contacts meanwhile."""
 
     impulse: np.ndarray
@@ -26,30 +26,30 @@ class Impact(NamedTuple):
     state: np.ndarray
 
 
-def impact(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> Impact | None:
+def impact(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> ImpactSolution | None:
     """Return the impact of the closed contacts; None without a solution.
 
     restitution: (u,). Where the impact would increase the energy, or has no solution, all coefficients are smaller by
     one factor.
     """
-    found = _impulses(free, v, closed, restitution)
-    if found is not None and _gain(free, v, found) <= 0.0:
-        return found
+    solution = _impulses(free, v, closed, restitution)
+    if solution is not None and _gain(free, v, solution) <= 0.0:
+        return solution
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        found = _impulses(free, v, closed, middle * restitution)
-        low, high = (middle, high) if found is not None and _gain(free, v, found) <= 0.0 else (low, middle)
+        solution = _impulses(free, v, closed, middle * restitution)
+        low, high = (middle, high) if solution is not None and _gain(free, v, solution) <= 0.0 else (low, middle)
     return _impulses(free, v, closed, low * restitution)
 
 
-def _gain(free: Unforced, v: np.ndarray, found: Impact) -> float:
+def _gain(free: Unforced, v: np.ndarray, solution: ImpactSolution) -> float:
     """Return the energy that an impact brings beyond round-off, J."""
     mass = free.system.mass
-    return float(mass @ (found.v**2 - v**2) - 1e-12 * mass @ v**2)
+    return float(mass @ (solution.v**2 - v**2) - 1e-12 * mass @ v**2)
 
 
-def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> Impact | None:
+def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution: np.ndarray) -> ImpactSolution | None:
     J, u = free.system.J, free.u
     speed, rebound = J @ v, restitution * np.minimum(free.normal @ v, 0.0)
     slow = ROUND_OFF * float((np.abs(J) @ np.abs(v)).max(initial=0.0))
@@ -57,7 +57,7 @@ def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution:
     for r in closed:
         options[r] = [STICK, SLIP_RIGHT, SLIP_LEFT, OPEN] if free.rubs[r] else [SLIP_RIGHT, OPEN]
 
-    def judge(states: States) -> tuple[Impact, list[Wrong]] | None:
+    def judge(states: States) -> tuple[ImpactSolution, list[Wrong]] | None:
         # friction elements are free of impulses
         holding = Holding(free, np.array(states, int))
         if not holding.possible:
@@ -70,7 +70,9 @@ def _impulses(free: Unforced, v: np.ndarray, closed: Sequence[int], restitution:
         left[: len(holding.closed)] += rebound[holding.closed]
         if np.abs(left).max(initial=0.0) > slow:  # rows that depend on each other, but are to part
             return None
-        return Impact(impulse, after, np.array(states)), _violation(free, states, impulse, after, rebound, slow, closed)
+        return ImpactSolution(impulse, after, np.array(states)), _violation(
+            free, states, impulse, after, rebound, slow, closed
+        )
 
     return search(options, _sweep(free, v, closed, rebound), judge)
 
@@ -93,9 +95,9 @@ def _sweep(free: Unforced, v: np.ndarray, closed: Sequence[int], rebound: np.nda
             largest = max(largest, abs(change))
         if largest <= _CONVERGED * max(map(abs, impulse), default=0.0):
             break
-    state, found = [OPEN] * u, dict(zip(rows, impulse, strict=True))
+    state, by_row = [OPEN] * u, dict(zip(rows, impulse, strict=True))
     for r in closed:
-        push, drag = found[r], found.get(u + r, 0.0)
+        push, drag = by_row[r], by_row.get(u + r, 0.0)
         if push > 0.0:
             sticks = free.rubs[r] and abs(drag) < (1 - _NEARLY) * system.friction[r] * push
             state[r] = STICK if sticks else slip_towards(-drag)
@@ -106,7 +108,7 @@ def _violation(
     free: Unforced, states: States, impulse: np.ndarray, after: np.ndarray, rebound: np.ndarray, slow: float,
     closed: Sequence[int],
 ) -> list[Wrong]:  # fmt: skip
-    """Return what speaks against impulses (2u,) and the velocities (N,) that they leave."""
+    """Return the defects of impulses (2u,) and the velocities (N,) that they leave."""
     u, least, wrong = free.u, ROUND_OFF * float(np.abs(impulse).max(initial=0.0)), []
     for r in closed:
         push, drag, bound = impulse[r], impulse[u + r], free.system.friction[r] * impulse[r]

@@ -40,7 +40,7 @@ States = tuple[int, ...]
 
 
 class Wrong(NamedTuple):
-    """What speaks against a choice of states: a unit, and the state that it should have instead."""
+    """A defect of a choice of states: a unit, and the state that it should have instead."""
 
     unit: int
     state: int
@@ -50,7 +50,7 @@ class Unforced:
     """A system without forces of its contacts, on the extended state: size of z, extent, slices, accelerations.
 
     Those of the springs of Jenkins elements are in it: they do not depend on whether their sliders, the last units
-    (sprung (u,)), move. pull (j, extent): their forces on what draws them. The sliders' speeds in the state are zero.
+    (sprung (u,)), move. pull (j, extent): their forces on their drivers. The sliders' speeds in the state are zero.
     gap (u, extent), speed (2u, extent): of the units; push (u, extent): forces of contacts that yield; relative
     (2u, extent): accelerations of the rows.
     """
@@ -104,7 +104,7 @@ class Unforced:
     def ways_of_slider(self, r: int, now: np.ndarray, sizes: np.ndarray, speed: float, slow: float) -> list[int]:
         """Return the states that a Jenkins element (unit r) may have: its slider moves with its spring at its bound.
 
-        now, sizes: (extent,) the state and its terms; speed: of what draws it, m/s.
+        now, sizes: (extent,) the state and its terms; speed: of its driver, m/s.
         """
         pull = self.pull[r - self.u]
         force, limit = float(pull @ now), self.system.limit[r]
@@ -141,7 +141,7 @@ class Holding:
         return spread
 
 
-class Motion:
+class LinearMotion:
     """The linear motion while units keep their states (u,): rate (extent, extent), force (2u, extent), event functions.
 
     guard (k, extent): positive until its event; pressed: (u,) contacts whose springs push; possible: whether forces can
@@ -180,7 +180,7 @@ class Motion:
         self._watch(free)
 
     def _watch(self, free: Unforced) -> None:
-        """Set the event functions of all units, in their order, and what each says where it is negative."""
+        """Set the event functions of all units, in their order, and their messages where negative."""
         system, way, one = free.system, ways(self.state), np.eye(free.extent)[free.one]
         events, self.wrong = possible_events(system, self.state), list[Wrong]()
         self.guard = np.zeros((len(events), free.extent))
@@ -191,7 +191,7 @@ class Motion:
         self._sizes = np.abs(self.guard)
 
     def judge(self, now: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, list[Wrong]]:
-        """Return the orders (k,) of the event functions at an extended state, and what turns negative at once.
+        """Return the orders (k,) of the event functions at an extended state, and which turn negative at once.
 
         now: (extent,) the state; sizes: (extent,) of its terms, whose round-off is no value.
         """

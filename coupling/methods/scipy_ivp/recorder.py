@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.methods.scipy_ivp.impacts import Impact
-from vanedamp.coupling.methods.scipy_ivp.motion import ROUND_OFF, Motion, Unforced
+from vanedamp.coupling.methods.scipy_ivp.impacts import ImpactSolution
+from vanedamp.coupling.methods.scipy_ivp.motion import ROUND_OFF, LinearMotion, Unforced
 from vanedamp.coupling.numerics.codes import LEAVING, OPEN
 from vanedamp.coupling.response.recorder import cubic_extremum, note_outputs, note_step, record_section
 from vanedamp.coupling.response.records import (
@@ -95,15 +95,15 @@ class Recorder:
         self.sum = np.zeros((self.count, len(of)))
         self.sum[of, np.arange(len(of))] = sign
 
-    def functionals(self, motion: Motion) -> np.ndarray:
+    def functionals(self, motion: LinearMotion) -> np.ndarray:
         """Return the functionals (., extent) whose products the rates of the integrals are, in a motion."""
         free, u, soft = self.free, self.free.u, self.soft
         dashpot = (self.system.dashpot * motion.pressed)[soft, None] * free.speed[soft]
         return np.concatenate([self.constant, motion.force[u:], motion.force[soft], dashpot])
 
-    def rates(self, found: np.ndarray) -> np.ndarray:
+    def rates(self, z: np.ndarray) -> np.ndarray:
         """Return the rates (count,) of the integrals from an extended state with the functionals below it."""
-        rates: np.ndarray = self.sum @ (found[self.left] * found[self.right])
+        rates: np.ndarray = self.sum @ (z[self.left] * z[self.right])
         return rates
 
     def sizes(self) -> np.ndarray:
@@ -116,7 +116,7 @@ class Recorder:
         reach = reach if np.isfinite(reach) else float(static.max(initial=1e-12))
         largest = np.abs(system.J).max(axis=0, initial=0.0)
         largest = np.where(largest > 0, largest, np.abs(system.response))
-        place = reach / np.where(largest > 0, largest, 1.0)
+        position = reach / np.where(largest > 0, largest, 1.0)
         mass = float(system.mass[system.along].sum())
         momentum, energy = (max(mass * size, 1e-300) for size in (omega * reach, (omega * reach) ** 2))
         integrals = np.full(self.count, energy)
@@ -125,7 +125,7 @@ class Recorder:
         integrals[_COUNT::3] = integrals[_COUNT + 1 :: 3] = momentum
         rows = np.full(3 * self.free.u, reach)
         rows[self.free.u :] *= omega
-        return np.concatenate([place, omega * place, rows, integrals])
+        return np.concatenate([position, omega * position, rows, integrals])
 
     # -- points of the motion
 
@@ -157,9 +157,9 @@ class Recorder:
             tilt[body] = max(tilt[body], abs(value[i]), abs(extremum))
         self.last = t, value, rate
         if self.records.outputs.shape[1]:
-            place = np.array([y[self.free.q], y[self.free.v]])
-            note_outputs(self.system, self.records, self.period, t - begun, *self.place, *place)
-            self.place = place
+            motion = np.array([y[self.free.q], y[self.free.v]])
+            note_outputs(self.system, self.records, self.period, t - begun, *self.place, *motion)
+            self.place = motion
 
     def flight(self, duration: float) -> None:
         """Add the duration of an arc to the time that bodies have spent off the floor."""
@@ -178,7 +178,7 @@ class Recorder:
 
     # -- events
 
-    def impact(self, t: float, before: np.ndarray, impact: Impact) -> None:
+    def impact(self, t: float, before: np.ndarray, impact: ImpactSolution) -> None:
         """Count and log an impact from velocities (N,)."""
         system, u = self.system, self.free.u
         speed, after = system.J @ before, system.J @ impact.v
@@ -206,7 +206,7 @@ class Recorder:
         """Enter the loss at the end of a chatter."""
         self.impact_loss += 0.5 * float(self.system.mass @ (before**2 - after**2))
 
-    def follow(self, t: float, y: np.ndarray, motion: Motion) -> None:
+    def follow(self, t: float, y: np.ndarray, motion: LinearMotion) -> None:
         """Record contacts that yield and begin or end: impacts, and the energy in a spring that is left compressed."""
         free, system, old, new = self.free, self.system, self.state, motion.state
         self.state, loaded = new, motion.pressed
@@ -244,7 +244,7 @@ class Recorder:
         ledger = np.zeros(len(ENERGIES))
         ledger[[EXCITATION, VISCOUS, FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
         ledger[CONTACT], ledger[IMPACT_LOSS] = integrals[_CONTACT] + self.spring_loss, self.impact_loss
-        # what Jenkins elements have taken is in their springs, or lost
+        # Jenkins elements' energy is in their springs, or lost
         springs = 0.5 * float(system.tangential @ (system.elongation @ q) ** 2)
         ledger[FRICTION] -= springs
         pressed = self.soft[presses(self.state[self.soft])]

@@ -40,24 +40,24 @@ _PLACES = np.r_[1.0, NODES[1:]]
 
 
 def first_root(samples: np.ndarray, order: np.ndarray) -> tuple[float, int] | None:
-    """Return the first place in 0 < x <= 1 at which one of several functions turns negative, and which; None without.
+    """Return the first x in (0, 1] at which one of several functions turns negative, and which; None without.
 
     samples: (functions, nodes) at NODES; order: (functions,) of the zero at x = 0 that a function leaves upwards; it is
     taken out of the function, so that round-off cannot find it again.
     """
-    found = None
+    first = None
     zero = order > 0
     coefficients = np.where(zero[:, None], samples / _PLACES ** order[:, None] @ _DEFLATED, samples @ _WHOLE)
     # one that is not positive there begins with round-off
     near = np.flatnonzero(~(coefficients.min(axis=1) > 0))
     coefficients[zero, 0] = np.maximum(coefficients[zero, 0], _TINY)
     for k in near:
-        own = coefficients[k]
-        limit = 1.0 if found is None else found[0]
-        root = _first(own, 0.0, 1.0, limit, _ROUND_OFF * float(np.abs(own).max()))
-        if root is not None and (found is None or root < found[0]):
-            found = root, int(k)
-    return found
+        polynomial = coefficients[k]
+        limit = 1.0 if first is None else first[0]
+        root = _first(polynomial, 0.0, 1.0, limit, _ROUND_OFF * float(np.abs(polynomial).max()))
+        if root is not None and (first is None or root < first[0]):
+            first = root, int(k)
+    return first
 
 
 def _first(b: np.ndarray, start: float, end: float, limit: float, noise: float) -> float | None:

@@ -1,6 +1,6 @@
 """A general solver of differential equations with events: scipy's DOP853, stopped at every change of contact.
 
-An independent check of the exact engine: it shares the units of a scene with it (coupling.system.units) and the table
+An independent check of the exact engine: it has a scene's units in common (coupling.system.units) and the table
 of their laws (coupling.system.unit_laws), but neither motion nor search nor decisions nor the solution of impacts.
 Closed contacts and what sticks are constraints on accelerations (methods.scipy_ivp.motion,
 methods.scipy_ivp.contact_states), impacts jumps between two integrations (methods.scipy_ivp.impacts); events are
@@ -18,8 +18,8 @@ from scipy.integrate import DOP853
 
 from vanedamp.coupling.methods.scipy_ivp import Options
 from vanedamp.coupling.methods.scipy_ivp.contact_states import decide
-from vanedamp.coupling.methods.scipy_ivp.impacts import Impact, impact
-from vanedamp.coupling.methods.scipy_ivp.motion import NEVER, ROUND_OFF, Motion, States, Unforced
+from vanedamp.coupling.methods.scipy_ivp.impacts import ImpactSolution, impact
+from vanedamp.coupling.methods.scipy_ivp.motion import NEVER, ROUND_OFF, LinearMotion, States, Unforced
 from vanedamp.coupling.methods.scipy_ivp.recorder import Recorder
 from vanedamp.coupling.methods.scipy_ivp.root_search import NODES, first_root
 from vanedamp.coupling.numerics.codes import LEAVING, OPEN, STICK
@@ -28,7 +28,7 @@ from vanedamp.coupling.response.event_log import rows_of_line, rows_of_units
 from vanedamp.coupling.response.plane import plane_of
 from vanedamp.coupling.response.records import Records
 from vanedamp.coupling.response.response import Status
-from vanedamp.coupling.system.assembly import Motion as InitialMotion
+from vanedamp.coupling.system.assembly import Coordinates
 from vanedamp.coupling.system.restitution import restitutions_at
 from vanedamp.coupling.system.system import System
 
@@ -39,7 +39,7 @@ _OPEN_LEDGER, _LEAST = 1e3, 1e-9
 #: the shortest first step, as a fraction of a period
 _SHORTEST = 1e-26
 #: fraction of a period without events in which events happen at once: impacts are the end of a collapse; fraction of a
-#: period for which gaps of sliders are known beyond the round-off of places, after a collision
+#: period for which gaps of sliders are known beyond the round-off of positions, after a collision
 _AT_ONCE, _FRESH = 1e-13, 1e-9
 #: gaps below this fraction of the play are closed at the start; above this one they are taken from the coordinates
 _TOUCHING, _FAR = 1e-12, 1e-6
@@ -72,9 +72,7 @@ class Arc(NamedTuple):
 class IvpRun:
     """A run by solve_ivp: state y = (q, v, integrals), states of the units. Times count from the period's start."""
 
-    def __init__(
-        self, system: System, options: Options, initial: InitialMotion, records: Records, events: bool
-    ) -> None:
+    def __init__(self, system: System, options: Options, initial: Coordinates, records: Records, events: bool) -> None:
         self.system, self.options, self.steps = system, options, options.steps_per_period
         self.free = free = Unforced(system)
         self.record = record = Recorder(free, records, self.steps, events)
@@ -87,9 +85,9 @@ class IvpRun:
         self.standing, self.events, self.evaluations, self.fastest = 0, 0, 0, system.speed
         self.begun = False
         self.state, self.struck = np.full(free.u, OPEN), np.full(free.u, -np.inf)  # times of the last impacts
-        self.motion: Motion
+        self.motion: LinearMotion
         self.guard, self.order, self.watched = np.zeros((0, free.extent)), np.zeros(0, int), np.zeros(0, int)
-        self.motions = lru_cache(_KEPT)(lambda states: Motion(free, states))
+        self.motions = lru_cache(_KEPT)(lambda states: LinearMotion(free, states))
         self.linear = lru_cache(_KEPT)(self._linear)
 
     def advance_to(self, periods: int) -> Status:
@@ -188,7 +186,7 @@ class IvpRun:
     def _first_step(self) -> float:
         """Return twice the time to the first event by the functions' parabolas: round-off is the flight's, s."""
         now = self.free.extended(self.time, self.y[: self.free.size])
-        # accelerations of what leaves by its third derivative are round-off
+        # rows that open by the third derivative have round-off accelerations
         early = self.order < 3
         guard, order, rate = self.guard[early], self.order[early], self.motion.rate @ now
         value = np.where(order > 0, 0.0, guard @ now)
@@ -205,13 +203,13 @@ class IvpRun:
 
     def rate(self, t: float, y: np.ndarray) -> np.ndarray:
         """Return the rates of the state and of the integrals."""
-        size, extent, found, phase = self.free.size, self.free.extent, self.found, self.system.frequency * t
-        found[:size], found[size] = y[:size], 1.0
-        np.cos(phase, out=found[self.free.cosine])
-        np.sin(phase, out=found[self.free.sine])
-        values = self.matrix @ found[:extent]
-        found[extent:] = values[size:]
-        return np.concatenate([values[:size], self.record.rates(found)])
+        size, extent, z, phase = self.free.size, self.free.extent, self.found, self.system.frequency * t
+        z[:size], z[size] = y[:size], 1.0
+        np.cos(phase, out=z[self.free.cosine])
+        np.sin(phase, out=z[self.free.sine])
+        values = self.matrix @ z[:extent]
+        z[extent:] = values[size:]
+        return np.concatenate([values[:size], self.record.rates(z)])
 
     # -- events
 
@@ -235,21 +233,21 @@ class IvpRun:
         for _ in range(_STANDING):
             if not np.any(free.normal[closed] @ v < -slow):
                 break
-            found = impact(free, v, closed.tolist(), self._restitution(v, closed))
-            if found is None:
+            solution = impact(free, v, closed.tolist(), self._restitution(v, closed))
+            if solution is None:
                 return False
-            self._jump(v, found)
+            self._jump(v, solution)
             if self.options.complete_chatter:
                 self._catch(v, closed, slow)
         else:
             return False
         chosen = self._motion(closed, touch, slow)
         if chosen is None:
-            # no forces can hold what slips: impulses stop it (Painleve's paradox)
+            # no forces hold the slip: impulses stop it (Painleve's paradox)
             step = impact(free, self._ahead(v, closed), closed.tolist(), np.zeros(free.u))
             if step is None:
                 return False
-            self._jump(v, Impact(step.impulse, v + free.respond @ step.impulse, step.state))
+            self._jump(v, ImpactSolution(step.impulse, v + free.respond @ step.impulse, step.state))
             self._stop(v, step)
             chosen = self._motion(closed, touch, slow)
         if chosen is None:
@@ -263,7 +261,7 @@ class IvpRun:
         self.record.follow(self.time, self.y, self.motion)
         return True
 
-    def _motion(self, closed: np.ndarray, touch: np.ndarray, slow: float) -> tuple[Motion, np.ndarray] | None:
+    def _motion(self, closed: np.ndarray, touch: np.ndarray, slow: float) -> tuple[LinearMotion, np.ndarray] | None:
         """Return the motion that begins now, and the orders of its zeros. Speeds that are round-off are set to zero.
 
         touch: (u,) gaps that count as zero, m; slow: speed that counts as zero, m/s.
@@ -290,11 +288,11 @@ class IvpRun:
         collapses = self.time - self.struck < _AT_ONCE * self.system.period
         return np.where(collapses, 0.0, coefficients)
 
-    def _jump(self, v: np.ndarray, found: Impact) -> None:
+    def _jump(self, v: np.ndarray, solution: ImpactSolution) -> None:
         """Change the velocities, in place, by an impact."""
-        self.record.impact(self.time, v, found)
-        self.struck[(found.impulse[: self.free.u] > 0.0) & (self.free.normal @ v < 0.0)] = self.time
-        v[:] = found.v
+        self.record.impact(self.time, v, solution)
+        self.struck[(solution.impulse[: self.free.u] > 0.0) & (self.free.normal @ v < 0.0)] = self.time
+        v[:] = solution.v
 
     def _bring(self, values: np.ndarray, rows: np.ndarray, off: np.ndarray) -> None:
         """Take from coordinates or velocities (N,), in place, what rows (k, N) are off zero."""
@@ -333,7 +331,7 @@ class IvpRun:
         ahead: np.ndarray = v + 0.5 * last * _CHATTER * system.period * (accelerations + free.respond @ forces)
         return ahead
 
-    def _stop(self, v: np.ndarray, step: Impact) -> None:
+    def _stop(self, v: np.ndarray, step: ImpactSolution) -> None:
         """Stop, in place, the contacts that push in a step, and the slips of those that stick."""
         free = self.free
         pushed = np.flatnonzero(step.impulse[: free.u] > 0.0)

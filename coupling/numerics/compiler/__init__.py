@@ -1,5 +1,5 @@
 """Numba: the decorators, machine code in memory and on disk, records, addresses of functions.
 
-Nothing else in the package imports numba. Much of this stands on what numba does not document; the list is
+Nothing else in the package imports numba. Much of this is undocumented by numba; the list is
 tests/coupling/numerics/compiler/test_numba.py, which names what a new version has changed.
 """

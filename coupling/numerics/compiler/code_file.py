@@ -1,7 +1,7 @@
 """Machine code of compiled functions on disk: damaged code is compiled again.
 
 numba replaces its files one by one, the index before the code, and does not force them to the disk. After a loss of
-power they may be empty or cut, hold zeros in place of code, or an index may name the code of another version. numba
+power they may be empty or cut, hold zeros instead of code, or an index may name the code of another version. numba
 runs what it finds.
 """
 
@@ -16,10 +16,10 @@ from numba.core.serialize import dumps
 
 
 class CodeFile(IndexDataCacheFile):
-    """numba's files of a function, an index and its code, with a digest of the code and of what it was made of."""
+    """numba's files of a function, an index and its code, with a digest of the code and of its sources."""
 
     def load(self, key: Any) -> Any:
-        """Return the code kept for a key; None if there is none, or none that can be trusted."""
+        """Return the code kept for a key; None without, or none that can be trusted."""
         try:
             digest, code = super().load(key)
             return pickle.loads(code) if digest == self._digest(key, code) else None
@@ -27,7 +27,7 @@ class CodeFile(IndexDataCacheFile):
             return None
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep code, in place of what cannot be read. Raises OSError, such as for a full disk."""
+        """Keep code, instead of what cannot be read. Raises OSError, such as for a full disk."""
         code = dumps(data)
         super().save(key, (self._digest(key, code), code))
 

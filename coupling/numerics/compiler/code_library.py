@@ -1,16 +1,16 @@
 """Code of compiled functions, linked as they are lowered and optimised once, in the function that Python calls.
 
-numba optimises every function, emits machine code for it, and links what comes out into its callers, where all of it is
+numba optimises every function, emits machine code for it, and links it into its callers, where all of it is
 optimised and emitted again: half of a first run's time for code that nobody calls. And it keeps with each function of
 its cache the intermediate code of all that is below it, for callers that would inline it, which takes longer to load
 than the machine code.
 
 numba takes another compiler by a documented way (`pipeline_class`), and that one another library of code, whose methods
 are numba's own but not documented; one function of numba is replaced, and does for other code what it did (`_index`).
-Where a version of numba lacks one of them, this module raises ImportError, and numba's compiler is taken (jit.py):
+Where a version of numba lacks one, this module raises ImportError, and numba's compiler is taken (jit.py):
 slower, with the same results. numba's own means
-do not replace it: numba 0.68 compiles the engine of sliders in 201 s in place of 41 s with its option `forceinline`;
-without, in 47 s, and a period takes 2.3 us in place of 1.6 us.
+do not replace it: numba 0.68 compiles the engine of sliders in 201 s instead of 41 s with its option `forceinline`;
+without, in 47 s, and a period takes 2.3 us instead of 1.6 us.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NopythonTypeInference
 from numba.np import arrayobj
 
-from vanedamp.coupling.numerics.compiler.record import Record
+from vanedamp.coupling.numerics.compiler.record import RecordType
 
 _METHODS = (
     "finalize", "get_pointer_to_function", "serialize_using_object_code", "_get_compiled_object",
@@ -55,7 +55,7 @@ _numbas_index: Any = getattr(arrayobj, "fix_integer_index", None)
 
 
 def _index(context: Any, builder: Any, kind: Any, index: Any, length: Any) -> Any:
-    """Return an index of an array as an address needs it, in place of numba's function."""
+    """Return an index of an array as an address needs it, instead of numba's function."""
     if isinstance(index, ir.Constant) or not getattr(builder.module, "from_zero", False):
         return _numbas_index(context, builder, kind, index, length)
     return context.cast(builder, index, kind, types.intp)
@@ -81,7 +81,7 @@ class _Kernel(_FromZero):
         """Leave the environment to the callers."""
 
     def lowered(self) -> Any:
-        """Return the module of this function alone."""
+        """Return this function's module."""
         return _whole(super()._get_module_for_linking())
 
     def _get_module_for_linking(self) -> Any:
@@ -120,9 +120,9 @@ class _Entry(_FromZero):
             self.codegen.set_env(name, lookup_environment(name))
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
-        """Return the machine code, and the names that it defines in place of the intermediate code.
+        """Return the machine code, and the names that it defines instead of the intermediate code.
 
-        They are variables there, so that numba refuses to link what is not there.
+        As variables, numba rejects missing ones at link time.
         """
         self._ensure_finalized()
         names = "\n".join(f'@"{name}" = global i8 0' for name in [*self._own, *self._environments()])
@@ -136,18 +136,18 @@ class _Entry(_FromZero):
     def _optimize_final_module(self) -> None:
         """Optimise the code, in which nobody else calls the functions below: so that unused arguments go.
 
-        Names of their own keep code that is loaded later, with all its arguments, from being taken for this one.
+        Unique names keep later code from being taken for this one.
         """
         apart = bool(self._loops) and not self.sized
-        for place, function in enumerate(self._final_module.functions):
+        for number, function in enumerate(self._final_module.functions):
             if function.name in self._own and apart:
-                # no vectors, which short loops pay for: long loops stay functions, with vectors of their own
+                # no vectors, which short loops pay for: long loops stay functions
                 function.add_function_attribute("noimplicitfloat")
             if function.name in self._loops and apart:
                 function.add_function_attribute("noinline")
             if not function.is_declaration and function.name not in self._own:
                 function.linkage = llvm.Linkage.internal
-                function.name = f"{self.name}.{place}"
+                function.name = f"{self.name}.{number}"
         if not apart:
             super()._optimize_final_module()
             return
@@ -210,10 +210,10 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
                 state.library.enable_object_caching()
             state.flags.forceinline = inline
             if isinstance(state.library, _Entry):
-                state.library.sized = any(isinstance(kind, Record) and kind.lengths for kind in state.args)
+                state.library.sized = any(isinstance(kind, RecordType) and kind.lengths for kind in state.args)
             return False
 
-    class Chosen(CompilerBase):
+    class LibraryCompiler(CompilerBase):
         """numba's compiler but for the library."""
 
         def define_pipelines(self) -> list[Any]:
@@ -223,7 +223,7 @@ def _compiler(library: type[JITCodeLibrary], name: str, inline: bool = False) ->
             passes.finalize()
             return [passes]
 
-    return Chosen
+    return LibraryCompiler
 
 
 if (

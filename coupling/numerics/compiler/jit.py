@@ -57,7 +57,7 @@ inlined: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON, **COMPILERS["inlined"]
 strict: _Decorator = njit(**_STRICT | _NOT_FROM_PYTHON, **COMPILERS["kernel"])
 #: a kernel whose sums may be taken in any order, several terms at once
 summing: _Decorator = njit(**_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "reassoc"}}, **COMPILERS["loops"])
-#: a kernel that compares many numbers, several at once; what it returns for NaN is anything
+#: a kernel that compares many numbers, several at once; its result for NaN is arbitrary
 comparing: _Decorator = njit(
     **_OPTIONS | _NOT_FROM_PYTHON | {"fastmath": {"contract", "nnan", "nsz"}}, **COMPILERS["loops"]
 )
@@ -127,23 +127,23 @@ def _kept(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     try:
         from vanedamp.coupling.numerics.compiler.code_file import CodeFile
 
-        kept = compiled._cache
+        stored = compiled._cache
         # numba dates a cached function by its own file only, but it holds the code of the functions that it calls
-        kept._cache_file = CodeFile(
-            kept.cache_path, kept._impl.filename_base, _sources(Path(function.__code__.co_filename))
+        stored._cache_file = CodeFile(
+            stored.cache_path, stored._impl.filename_base, _sources(Path(function.__code__.co_filename))
         )  # fmt: skip
     except (AttributeError, ImportError, TypeError):  # another numba: nothing is kept, as its date would not do
         return njit(**options, **COMPILERS["entry"])(function)
-    # references are counted by what numba makes ready as it loads all that it could compile
-    if hasattr(kept, "_load_overload") and not options["_nrt"]:
-        kept.load_overload = partial(_load, kept)
+    # references are counted by code that numba prepares as it loads all that it could compile
+    if hasattr(stored, "_load_overload") and not options["_nrt"]:
+        stored.load_overload = partial(_load, stored)
     return compiled
 
 
-def _load(kept: Any, signature: Any, target: Any) -> Any:
+def _load(stored: Any, signature: Any, target: Any) -> Any:
     """Load machine code as numba does, without all that it could compile, which takes a quarter of a start."""
-    with kept._guard_against_spurious_io_errors():
-        return kept._load_overload(signature, target)
+    with stored._guard_against_spurious_io_errors():
+        return stored._load_overload(signature, target)
 
 
 @cache
@@ -152,15 +152,15 @@ def _sources(file: Path) -> str:
 
     The imports of other files are data: they do not enter the code.
     """
-    found: set[Path] = set()
+    sources: set[Path] = set()
     waiting = [file]
     while waiting:
         path = waiting.pop()
-        if path not in found:
-            found.add(path)
+        if path not in sources:
+            sources.add(path)
             waiting += _read(path)[1]
     digest = hashlib.sha256()
-    for path in sorted(found):
+    for path in sorted(sources):
         digest.update(_read(path)[0])
     return digest.hexdigest()
 

@@ -1,9 +1,9 @@
-"""Records of compiled functions: named tuples that are passed by their place.
+"""Records of compiled functions: named tuples passed by address.
 
 numba passes a named tuple by its items, an array as seven of them: the engine's records would be hundreds of arguments,
 which take longer to pass than many a function takes, and longer to compile (numba 0.68: a period takes 2.5 us in place
-of 1.6 us, the first compilation 48 s in place of 41 s). A record made with `record` is passed as one pointer to all of
-them. Records never change while compiled functions run: what is loaded once is known, whatever has been written to the
+of 1.6 us, the first compilation 48 s instead of 41 s). A record made with `record` is passed as one pointer to all of
+them. Records never change while compiled functions run: a value loaded once stays, whatever has been written to the
 arrays meanwhile.
 
 A type may have the lengths of the arrays in it: functions are compiled for these lengths then.
@@ -38,7 +38,7 @@ Class = TypeVar("Class", bound=type[tuple[Any, ...]])
 Named = TypeVar("Named", bound=tuple[Any, ...])
 
 
-class Record(types.Type):
+class RecordType(types.Type):
     """The type of a record: its class, the types of its fields, and the lengths that it is compiled for.
 
     lengths: of each field None, the value of an integer, or the shape of an array, None in it for an axis that may be
@@ -52,7 +52,7 @@ class Record(types.Type):
 
     @property
     def key(self) -> tuple[Any, ...]:
-        """What tells types apart."""
+        """The key of a type."""
         return self.kind, *self.fields.items(), *self.lengths.items()
 
 
@@ -114,13 +114,13 @@ def is_record(value: Any) -> bool:
     return type(value) in _LENGTHS
 
 
-def sized_type(values: Any) -> Record:
+def sized_type(values: Any) -> RecordType:
     """Return the type of a record with the lengths of its arrays in it."""
     return _type(values, dict(zip(values._fields, lengths(values), strict=True)))
 
 
 def lengths(values: Any) -> tuple[Any, ...]:
-    """Return the lengths of a record's fields, as `Record` holds them."""
+    """Return the lengths of a record's fields, as `RecordType` holds them."""
     sizes, free = _LENGTHS[type(values)]
     return tuple(
         (None,) * min(free, value.ndim) + value.shape[free:]
@@ -130,12 +130,12 @@ def lengths(values: Any) -> tuple[Any, ...]:
     )
 
 
-def _type(values: Any, of_lengths: dict[str, Any] | None = None) -> Record:
+def _type(values: Any, of_lengths: dict[str, Any] | None = None) -> RecordType:
     fields = {name: typeof(value) for name, value in zip(values._fields, values, strict=True)}
-    return Record(type(values), fields, of_lengths)
+    return RecordType(type(values), fields, of_lengths)
 
 
-@register_model(Record)
+@register_model(RecordType)
 class _Place(models.PrimitiveModel):
     """A pointer to the fields, each as numba holds it in a variable."""
 
@@ -146,20 +146,20 @@ class _Place(models.PrimitiveModel):
 
 @infer_getattr
 class _Fields(AttributeTemplate):
-    key = Record
+    key = RecordType
 
     def generic_resolve(self, record, name):
         return record.fields.get(name)
 
 
-@lower_getattr_generic(Record)
+@lower_getattr_generic(RecordType)
 def _get(context, builder, type, value, name):
-    """Load a field. All loads are marked as those of what never changes."""
+    """Load a field. All loads are marked as invariant."""
     field, length = type.fields[name], type.lengths.get(name)
     if isinstance(field, types.Integer) and length is not None:
         return context.get_constant(field, length)
-    place = cgutils.gep_inbounds(builder, value, 0, list(type.fields).index(name))
-    loaded = _load(builder, place, builder.module.add_metadata([]))
+    pointer = cgutils.gep_inbounds(builder, value, 0, list(type.fields).index(name))
+    loaded = _load(builder, pointer, builder.module.add_metadata([]))
     whole = context.data_model_manager[field].from_data(builder, loaded)
     whole = whole if length is None else _with_lengths(context, builder, field, whole, length)
     return impl_ret_borrowed(context, builder, field, whole)
@@ -180,24 +180,24 @@ def _with_lengths(context: Any, builder: Any, field: Any, value: Any, shape: Seq
     return array._getvalue()
 
 
-def _load(builder: Any, place: Any, never: Any) -> Any:
-    """Load from a place, the parts of a structure one by one: a load of all of them would lose its mark."""
-    kind = place.type.pointee
+def _load(builder: Any, pointer: Any, never: Any) -> Any:
+    """Load from a pointer, the parts of a structure one by one: a load of all would lose its mark."""
+    kind = pointer.type.pointee
     if not isinstance(kind, ir.LiteralStructType | ir.ArrayType):
-        loaded = builder.load(place)
+        loaded = builder.load(pointer)
         loaded.set_metadata("invariant.load", never)
         return loaded
     whole = ir.Constant(kind, ir.Undefined)
     for i in range(len(kind)):
-        part = _load(builder, cgutils.gep_inbounds(builder, place, 0, i), never)
-        whole = builder.insert_value(whole, part, i)
+        entry = _load(builder, cgutils.gep_inbounds(builder, pointer, 0, i), never)
+        whole = builder.insert_value(whole, entry, i)
     return whole
 
 
 def changed(record: Named, name: str, number: float) -> Named:
     """Return a record with another number in a field: `changed(system, "period", 0.5)`, in compiled functions.
 
-    There it stays as it is until the next change at the same place in the code.
+    It stays valid until the next change at the same line.
     """
     return record._replace(**{name: number})  # type: ignore[attr-defined]
 
@@ -215,29 +215,29 @@ def _changed(typing_context, record, name, number):
         kind = context.get_value_type(record).pointee
         copy = cgutils.alloca_once(builder, kind)
         builder.store(builder.load(values[0]), copy)
-        place = list(record.fields).index(name.literal_value)
-        builder.store(values[2], cgutils.gep_inbounds(builder, copy, 0, place))
-        # loads from a record are marked as those of what never changes: none may be taken from before this point
+        index = list(record.fields).index(name.literal_value)
+        builder.store(values[2], cgutils.gep_inbounds(builder, copy, 0, index))
+        # loads from a record are marked as invariant: none may be taken from before this point
         pointer = cgutils.alloca_once(builder, copy.type)
         builder.store_atomic(copy, pointer, "seq_cst", 8)
         builder.fence("seq_cst")
         return builder.load_atomic(pointer, "seq_cst", 8)
 
-    if not (isinstance(record, Record) and isinstance(name, types.StringLiteral)):
+    if not (isinstance(record, RecordType) and isinstance(name, types.StringLiteral)):
         return None
     return record(record, name, record.fields[name.literal_value]), code
 
 
-@unbox(Record)
+@unbox(RecordType)
 def _take(type, values, c):
     """Put the fields on the stack of the call from Python."""
-    place = cgutils.alloca_once(c.builder, c.context.get_value_type(type).pointee)
+    pointer = cgutils.alloca_once(c.builder, c.context.get_value_type(type).pointee)
     failed = cgutils.alloca_once_value(c.builder, cgutils.false_bit)
     cleanups = []
     for i, field in enumerate(type.fields.values()):
         native = c.unbox(field, c.pyapi.tuple_getitem(values, i))
         data = c.context.data_model_manager[field].as_data(c.builder, native.value)
-        c.builder.store(data, cgutils.gep_inbounds(c.builder, place, 0, i))
+        c.builder.store(data, cgutils.gep_inbounds(c.builder, pointer, 0, i))
         with c.builder.if_then(native.is_error, likely=False):
             c.builder.store(cgutils.true_bit, failed)
         if native.cleanup is not None:
@@ -247,4 +247,4 @@ def _take(type, values, c):
         for one in reversed(cleanups):
             one()
 
-    return NativeValue(place, cleanup=cleanup if cleanups else None, is_error=c.builder.load(failed))
+    return NativeValue(pointer, cleanup=cleanup if cleanups else None, is_error=c.builder.load(failed))

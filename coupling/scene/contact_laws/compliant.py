@@ -90,10 +90,10 @@ class Compliant(ContactLaw):
 
     def element(self, restitution: float, mass: float, flexibility: float | None = None) -> Element:
         """Return the element of a pair, as every law does. Raises InputError at restitution 0."""
-        own = self.flexibility(mass)
+        local = self.flexibility(mass)
         if self.stiffness == "patch" and flexibility is not None and flexibility <= 0.0:
-            own = 0.0  # a wall that lacks nothing is no patch
-        stiffness = spring_on_wall(own, flexibility) if self.takes_residual_flexibility else 1.0 / own
+            local = 0.0  # a wall that lacks nothing is no patch
+        stiffness = spring_on_wall(local, flexibility) if self.takes_residual_flexibility else 1.0 / local
         dashpot = 2 * damping_ratio(restitution) * math.sqrt(stiffness * mass)
         return Element(restitution, stiffness, dashpot)
 

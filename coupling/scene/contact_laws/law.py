@@ -98,16 +98,16 @@ class ContactLaw:
         return ((0.0, element),)
 
 
-def spring_on_wall(own: float, flexibility: float | None) -> float:
-    """Return the stiffness of a spring (flexibility `own`) on a wall that yields; 1 where the wall is not known yet.
+def spring_on_wall(local: float, flexibility: float | None) -> float:
+    """Return the stiffness of a spring (flexibility `local`) on a wall that yields; 1 where the wall is not known yet.
 
     Raises InputError where nothing yields.
     """
     if flexibility is None:
         return 1.0
-    if own + flexibility <= 0.0:
+    if local + flexibility <= 0.0:
         raise InputError(
             "contact: the reduced model lacks no flexibility at the walls; take structure.natural = true with modes, "
             "or a model of basis macneal or massless"
         )
-    return 1.0 / (own + flexibility)
+    return 1.0 / (local + flexibility)

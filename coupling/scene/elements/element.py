@@ -45,7 +45,7 @@ class Parts(Protocol):
         """Return the displacement of a body along its cavity, relative to it, from the middle."""
 
     def contact(self, normal: np.ndarray, restitution: float, *labels: str | None) -> Element:
-        """Return the scene's contact of a normal row, between places of the structure: how it rebounds or yields."""
+        """Return the scene's contact of a normal row, between points of the structure: how it rebounds or yields."""
 
     def travel(self, normal: np.ndarray) -> float:
         """Return how far a row of the structure moves under the static loads and the initial motion, m."""

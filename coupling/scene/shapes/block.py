@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vanedamp.coupling.scene.shapes.shape import Measured, Polygon, Shape
+from vanedamp.coupling.scene.shapes.shape import BodyMeasures, Polygon, Shape
 
 
 class Block(Polygon):
@@ -17,7 +17,7 @@ class Block(Polygon):
     half_extent = Shape.half_extent
     inertia = Shape.inertia
 
-    def corners(self, body: Measured) -> np.ndarray:
+    def corners(self, body: BodyMeasures) -> np.ndarray:
         """Return its four corners."""
         a, b = self.half_extent(body)
         return np.array([(-a, -b), (a, -b), (a, b), (-a, b)])

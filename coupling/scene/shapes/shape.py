@@ -22,7 +22,7 @@ Point = tuple[int, float, float]
 _SAME = 1e-12
 
 
-class Measured(Protocol):
+class BodyMeasures(Protocol):
     """What a shape asks of its body (scene.bodies.Damper): mass, kg, and measures, m, None where they are not given."""
 
     @property
@@ -48,33 +48,33 @@ class Shape:
     #: its measures that a file must give, m: keys of Damper, or further ones, with a description that ends in "[m]"
     measures: ClassVar[Mapping[str, str]] = {}
 
-    def half_extent(self, body: Measured) -> tuple[float, float]:
+    def half_extent(self, body: BodyMeasures) -> tuple[float, float]:
         """Return half of its extent along and across, m."""
         return (body.measure("length") or 0.0) / 2, (body.measure("height") or 0.0) / 2
 
-    def inertia(self, body: Measured) -> float:
+    def inertia(self, body: BodyMeasures) -> float:
         """Return the moment of inertia of the homogeneous body about its centre, kg m^2."""
         a, b = self.half_extent(body)
         return body.mass * ((a * a + b * b) / 3)
 
-    def corners(self, body: Measured) -> np.ndarray:
+    def corners(self, body: BodyMeasures) -> np.ndarray:
         """Return the corners (k, 2) of its outline, counterclockwise from the lower left one; (0, 2): it is round."""
         return np.zeros((0, 2))
 
-    def points(self, body: Measured, surface: int) -> tuple[Point, ...]:
+    def points(self, body: BodyMeasures, surface: int) -> tuple[Point, ...]:
         """Return the points that touch a surface of the cavity (SIDES)."""
         return ()
 
-    def face(self, body: Measured) -> tuple[float, float]:
+    def face(self, body: BodyMeasures) -> tuple[float, float]:
         """Return the lowest and the highest point above the floor, m, at which it touches a neighbour."""
         heights = [self.half_extent(body)[1] + b for _, _, b in self.points(body, RIGHT)]
         return min(heights), max(heights)
 
-    def rise(self, body: Measured, tilt: float) -> float:
+    def rise(self, body: BodyMeasures, tilt: float) -> float:
         """Return the height, m, by which a tilt, rad, lifts the centre of a body that stands on the floor."""
         return max((-tilt * a for _, a, _ in self.points(body, FLOOR)), default=0.0)
 
-    def shortening(self, body: Measured) -> float:
+    def shortening(self, body: BodyMeasures) -> float:
         """Return by how much a tilt shortens the body, m, to second order per square of the tilt; nan: never tilted."""
         return max(self.half_extent(body)) / 2
 
@@ -86,12 +86,12 @@ class Polygon(Shape):
     of the edge between them, and tilts are small.
     """
 
-    def half_extent(self, body: Measured) -> tuple[float, float]:
+    def half_extent(self, body: BodyMeasures) -> tuple[float, float]:
         """Return half of the extent of its corners."""
         a, b = np.abs(self.corners(body)).max(axis=0).tolist()
         return a, b
 
-    def inertia(self, body: Measured) -> float:
+    def inertia(self, body: BodyMeasures) -> float:
         """Return the sum over the triangles between the centre and the edges."""
         first = self.corners(body)
         second = np.roll(first, -1, axis=0)
@@ -99,7 +99,7 @@ class Polygon(Shape):
         squares = (first * first + first * second + second * second).sum(axis=1)
         return float(body.mass * (double @ squares) / (6 * double.sum()))
 
-    def points(self, body: Measured, surface: int) -> tuple[Point, ...]:
+    def points(self, body: BodyMeasures, surface: int) -> tuple[Point, ...]:
         """Return the corners that are farthest out on that side."""
         corners, (x, y) = self.corners(body).tolist(), OUTWARDS[surface]
         out = [x * a + y * b for a, b in corners]

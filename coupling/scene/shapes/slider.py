@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, Measured, Point, Shape
+from vanedamp.coupling.scene.shapes.shape import CEILING, FLOOR, BodyMeasures, Point, Shape
 
 
 class Slider(Shape):
@@ -13,15 +13,15 @@ class Slider(Shape):
 
     planar = extended = False
 
-    def points(self, body: Measured, surface: int) -> tuple[Point, ...]:
+    def points(self, body: BodyMeasures, surface: int) -> tuple[Point, ...]:
         """Return its centre, for walls."""
         return () if surface in (FLOOR, CEILING) else ((-1, 0.0, 0.0),)
 
-    def face(self, body: Measured) -> tuple[float, float]:
+    def face(self, body: BodyMeasures) -> tuple[float, float]:
         """Return the floor: sliders touch whatever their heights."""
         return 0.0, 0.0
 
-    def shortening(self, body: Measured) -> float:
+    def shortening(self, body: BodyMeasures) -> float:
         """Return nan: it never tilts."""
         return float("nan")
 

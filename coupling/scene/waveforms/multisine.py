@@ -20,7 +20,7 @@ from vanedamp.coupling.scene.sines import peaks
 from vanedamp.coupling.scene.waveform import Waveform
 from vanedamp.files.toml_input import STRICT, NonNegative, Positive, Whole
 
-#: half of the exponents p of the norms, one after the other, and the iterations of each
+#: half of the exponents p of the norms, in turn, and the iterations of each
 _HALF_NORMS, _ITERATIONS = (2, 4, 8, 16, 32, 64, 128), 200
 #: least samples per period and order for a norm
 _SAMPLES = 8
@@ -107,7 +107,7 @@ def _crest(order: np.ndarray, size: np.ndarray, phase: np.ndarray) -> float:
 
 
 def _between(order: np.ndarray, size: np.ndarray, one: np.ndarray, other: np.ndarray, target: float) -> np.ndarray:
-    """Return phases on the way from one set to another with a crest factor between theirs, or equal to one of them."""
+    """Return phases on the way from one set to another with a crest factor between theirs, or equal to one."""
     from scipy.optimize import brentq
 
     way = (other - one + np.pi) % (2 * np.pi) - np.pi

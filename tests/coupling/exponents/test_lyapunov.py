@@ -9,7 +9,7 @@ import pytest
 from tests.coupling.orbits.test_closed_forms import GAP, gapped, stopped
 from tests.tools.closed_form_scenes import scene
 from vanedamp.coupling.derivatives.passage import PassageStatus
-from vanedamp.coupling.exponents.lyapunov import Motion, lyapunov
+from vanedamp.coupling.exponents.lyapunov import MotionKind, lyapunov
 from vanedamp.coupling.orbits.period_map import period_map
 from vanedamp.coupling.scene.scene import LEAST_EXPONENTS
 from vanedamp.coupling.simulation import simulate
@@ -44,7 +44,7 @@ def test_a_linear_oscillator_has_the_real_parts_of_its_eigenvalues(tables, neutr
     found = lyapunov(oscillator(0.4, **tables), 64)
     assert found.neutral == neutral and found.status is PassageStatus.OK
     assert found.exponents == pytest.approx([-0.1, -0.1], abs=1e-10)
-    assert found.motion is Motion.PERIODIC and found.repeats == 1 and found.periods == 32
+    assert found.motion is MotionKind.PERIODIC and found.repeats == 1 and found.periods == 32
 
 
 def test_a_fast_oscillator_has_no_neutral_direction():
@@ -74,25 +74,25 @@ def test_a_body_in_free_flight_on_a_shaker_has_none():
     shaker = {"model": "prescribed", "displacement_amplitude": 1e-3}
     found = lyapunov(scene(structure=shaker, excitation={"frequency": 1.0}, time={"periods": 9}, **BODY), 32)
     assert found.neutral == 2 and len(found.exponents) == 0 and math.isnan(found.largest)
-    assert found.motion is Motion.PERIODIC and found.status is PassageStatus.OK
+    assert found.motion is MotionKind.PERIODIC and found.status is PassageStatus.OK
 
 
 def test_an_undamped_oscillator_at_another_frequency_is_quasi_periodic():
     found = lyapunov(oscillator(0.0).replace({"initial.displacement": 0.3}), 300)
-    assert found.repeats == 0 and found.motion is Motion.QUASI_PERIODIC
+    assert found.repeats == 0 and found.motion is MotionKind.QUASI_PERIODIC
     assert np.abs(found.exponents).max() < 1e-12
 
 
 def test_few_periods_do_not_tell_a_torus():
     data, start = settled(1e-3)
-    assert lyapunov(data, 100, start).motion is Motion.UNDECIDED
+    assert lyapunov(data, 100, start).motion is MotionKind.UNDECIDED
 
 
 def test_a_linear_motion_need_not_have_settled():
     """At resonance a decaying motion turns by nearly nothing per period: mean growths would take long to be right."""
     data = oscillator(0.04, math.sqrt(1.5) / (2 * math.pi)).replace({"time": {"periods": 10, "transient": 0}})
     found = lyapunov(data, 64)
-    assert found.repeats == 0 and found.motion is Motion.PERIODIC
+    assert found.repeats == 0 and found.motion is MotionKind.PERIODIC
     assert found.exponents == pytest.approx([-0.01, -0.01], abs=1e-10)
 
 
@@ -101,7 +101,7 @@ def test_a_periodic_motion_has_the_logarithms_of_its_multipliers(omega):
     orbit = replace(GAP, omega=omega)
     data = gapped(orbit)
     found = lyapunov(data, 400, period_map(data).restart_of(orbit.state * (1 + 1e-8)))
-    assert found.motion is Motion.PERIODIC and found.repeats == 1
+    assert found.motion is MotionKind.PERIODIC and found.repeats == 1
     expected = np.sort(np.log(np.abs(np.linalg.eigvals(orbit.half @ orbit.half))))[::-1] / orbit.period
     assert found.exponents == pytest.approx(expected, abs=1e-9)
     assert found.error < 1e-9
@@ -112,7 +112,7 @@ def test_a_run_on_an_unstable_orbit_is_not_called_periodic():
     orbit = replace(GAP, omega=BORDER + 0.02)
     data = gapped(orbit)
     found = lyapunov(data, 32, period_map(data).restart_of(orbit.state))
-    assert found.repeats == 1 and found.motion is Motion.UNDECIDED
+    assert found.repeats == 1 and found.motion is MotionKind.UNDECIDED
     multiplier = np.abs(np.linalg.eigvals(orbit.half @ orbit.half)).max()
     assert found.largest == pytest.approx(math.log(multiplier) / orbit.period, abs=1e-6) and multiplier > 1
 
@@ -121,7 +121,7 @@ def test_a_torus_beyond_a_neimark_sacker_point():
     """The largest exponent is zero; the next is twice the rate at which the unstable orbit is left, to first order."""
     data, start = settled(1e-3)
     found = lyapunov(data, 500, start)
-    assert found.motion is Motion.QUASI_PERIODIC and found.repeats == 0
+    assert found.motion is MotionKind.QUASI_PERIODIC and found.repeats == 0
     assert abs(found.largest) < found.error + math.log(500) / 500 / found.period
     orbit = replace(GAP, omega=BORDER + 1e-3)
     leaves = math.log(np.abs(np.linalg.eigvals(orbit.half @ orbit.half)).max()) / orbit.period
@@ -137,9 +137,9 @@ def test_chaos_agrees_with_neighbouring_motions_and_the_damping():
     for speed in np.linspace(0.5, 0.9, 9):
         start = simulate(data.replace({"damper.0.velocity": float(speed)})).final
         found = lyapunov(data, periods, start)
-        if found.motion is Motion.CHAOTIC:
+        if found.motion is MotionKind.CHAOTIC:
             break
-    assert found.motion is Motion.CHAOTIC and found.largest > 3 * found.error
+    assert found.motion is MotionKind.CHAOTIC and found.largest > 3 * found.error
     assert found.exponents.sum() == pytest.approx(-GAP.damping / GAP.mass, abs=1e-10)
 
     map_ = period_map(data)
@@ -161,7 +161,7 @@ def test_a_passage_without_derivative_leaves_no_exponent():
     data = stopped(0.1)
     walked = period_map(data)
     found = lyapunov(data, 64, walked.restart_of(walked.linear_orbit()))
-    assert found.status is PassageStatus.GRAZING and found.motion is Motion.UNDECIDED
+    assert found.status is PassageStatus.GRAZING and found.motion is MotionKind.UNDECIDED
     assert math.isnan(found.largest) and math.isnan(found.error) and found.to_json()["exponents"] == []
 
 

@@ -15,9 +15,9 @@ from tests.tools.tiers import cases
 from vanedamp.coupling.orbits.border_path import BorderPath
 from vanedamp.coupling.orbits.borders import first_point
 from vanedamp.coupling.orbits.branch import Branches
-from vanedamp.coupling.orbits.conditions import Clearance, Pair, Singular
+from vanedamp.coupling.orbits.conditions import Clearance, MultiplierPair, Singular
 from vanedamp.coupling.orbits.orbits import orbits
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -28,12 +28,12 @@ TABLE = Table(**{"from": 0.0, "to": 1.0, "step": 0.01, "max_step": 0.05})
 
 def begun(function, size, start, numbers, kind, low, high):
     """The first point of a border of a map near a state and two numbers, both of which range from low to high."""
-    problem = Problem(maps.smooth(function, size), ("a", "b"), np.full(2, low), np.full(2, high - low))
+    problem = OrbitProblem(maps.smooth(function, size), ("a", "b"), np.full(2, low), np.full(2, high - low))
     y = problem.pack(np.array(start, float), *numbers)
     passage = problem.passage(y)
     pair = np.linalg.eigvals(passage.derivative)
     return first_point(
-        Pair(problem, 0, pair.sum().real) if kind == "pair" else Singular.of(problem, kind, 0, passage), y
+        MultiplierPair(problem, 0, pair.sum().real) if kind == "pair" else Singular.of(problem, kind, 0, passage), y
     )
 
 
@@ -127,7 +127,7 @@ def test_the_sequence_of_events_changes_along_its_closed_form():
         clearance = (float(-x[0]), "sticks 0") if x[0] < 0 else (math.inf, "")
         return 0.5 * x + ab[0] - ab[1] ** 2, np.array([[0.5]]), crossings, clearance
 
-    problem = Problem(maps.ClosedMap(step, np.ones(1)), ("a", "b"), np.full(2, -1.0), np.full(2, 2.0))
+    problem = OrbitProblem(maps.ClosedMap(step, np.ones(1)), ("a", "b"), np.full(2, -1.0), np.full(2, 2.0))
     first = first_point(Clearance(problem, 0), problem.pack(np.array([-0.02]), 0.24, 0.5))
     for way, end in ((1.0, 1.0), (-1.0, -1.0)):
         path = followed(first, way)

@@ -18,12 +18,12 @@ from tests.reference.orbit_upright_body import UprightBody
 from tests.tools.closed_form_scenes import ball, scene
 from tests.tools.tiers import cases
 from vanedamp.coupling.derivatives.passage import PassageStatus
-from vanedamp.coupling.orbits.continuation import Continuation
-from vanedamp.coupling.orbits.curve import Point
+from vanedamp.coupling.orbits.continuation import BranchPath
+from vanedamp.coupling.orbits.curve import CurvePoint
 from vanedamp.coupling.orbits.newton import OrbitStatus, solve
 from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.period_map import period_map
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.coupling.simulation import simulate
@@ -328,10 +328,10 @@ def test_a_branch_keeps_its_sequence_while_both_of_its_impacts_come_to_graze():
     grazes = brentq(lambda omega: 1 / abs(1 - omega**2 + 0.1j * omega) - GAP.half_gap, 0.9, 1.0, xtol=1e-14)
     unit = grazes / (2 * math.pi)
     orbit = replace(GAP, omega=0.999 * grazes, larger=False)
-    problem = Problem.along(period_map(gapped(orbit)), 0.999 * unit, 0.00095 * unit)
+    problem = OrbitProblem.along(period_map(gapped(orbit)), 0.999 * unit, 0.00095 * unit)
     row = problem.row()
     zero = solve(problem, problem.pack(orbit.state, 0.999 * unit), row)
-    path = Continuation(Table(**{"from": 0.999 * unit, "to": 0.99995 * unit}), Point(problem, zero, row))
+    path = BranchPath(Table(**{"from": 0.999 * unit, "to": 0.99995 * unit}), CurvePoint(problem, zero, row))
     while not path.end:
         path.advance()
     assert path.end == path.edge and [named.kind for named in path.branch.special] == ["end"]

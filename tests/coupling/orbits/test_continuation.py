@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.tools import closed_maps as maps
-from vanedamp.coupling.orbits.continuation import Continuation
-from vanedamp.coupling.orbits.curve import Point
+from vanedamp.coupling.orbits.continuation import BranchPath
+from vanedamp.coupling.orbits.curve import CurvePoint
 from vanedamp.coupling.orbits.diagram import Diagram
 from vanedamp.coupling.orbits.first_orbit import Start, Starts
 from vanedamp.coupling.orbits.multipliers import indicators, multipliers
 from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit, solve
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
 
@@ -165,10 +165,10 @@ def test_a_branch_of_one_impact_keeps_the_product_of_its_multipliers():
 def test_a_closed_branch_ends_where_it_began():
     """The orbits lie on a circle of state and parameter; the branch begins at its top."""
     table = Table(**{"from": -1.5, "to": 1.5, "max_points": 800})
-    problem = Problem.along(maps.smooth(maps.isola, 1), -1.5, 3.0)
+    problem = OrbitProblem.along(maps.smooth(maps.isola, 1), -1.5, 3.0)
     start = problem.pack(np.array([1.0]), 0.0)
     row = np.array([0.0, 1.0])
-    followed = Continuation(table, Point(problem, solve(problem, start, row), row))
+    followed = BranchPath(table, CurvePoint(problem, solve(problem, start, row), row))
     while not followed.end:
         followed.advance()
     branch = followed.branch

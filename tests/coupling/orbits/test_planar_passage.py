@@ -15,7 +15,7 @@ from vanedamp.coupling.derivatives.passage import PassageStatus
 from vanedamp.coupling.derivatives.walk import PassageWalk, run_from
 from vanedamp.coupling.engine.plane.planar_run import PlanarRun
 from vanedamp.coupling.orbits.branch import Branch, Branches
-from vanedamp.coupling.orbits.continuation import kept
+from vanedamp.coupling.orbits.continuation import data_of
 from vanedamp.coupling.orbits.multipliers import decided
 from vanedamp.coupling.orbits.newton import OrbitStatus, find_orbit
 from vanedamp.coupling.orbits.period_map import period_map
@@ -367,7 +367,7 @@ def test_an_orbit_without_derivative_is_not_called_stable():
     tilted[found.names.index("body 0 tilt")] += 1e-9
     assert np.abs(found(tilted).state - orbit.state).max() > 1e-3
     assert orbit.undetermined and not orbit.stable
-    branch = Branch.of([kept(orbit)], periods=1, special=(), end="")
+    branch = Branch.of([data_of(orbit)], periods=1, special=(), end="")
     branches = Branches(replace(found.scene, orbit=Orbit()), found.names, found.scale, (branch,), 0)
     told = branches.to_json()["branches"][0]
     assert (told["stable_points"], told["undetermined_points"]) == (0, 1)

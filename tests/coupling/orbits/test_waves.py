@@ -9,13 +9,13 @@ import vanedamp as vd
 from tests.tools.rings import Chain
 from vanedamp.coupling.orbits.borders import first_point
 from vanedamp.coupling.orbits.conditions import Peak
-from vanedamp.coupling.orbits.continuation import Continuation
-from vanedamp.coupling.orbits.curve import Point
+from vanedamp.coupling.orbits.continuation import BranchPath
+from vanedamp.coupling.orbits.curve import CurvePoint
 from vanedamp.coupling.orbits.newton import find_orbit as newton_orbit
 from vanedamp.coupling.orbits.newton import solve
 from vanedamp.coupling.orbits.orbits import find_orbit, orbits
 from vanedamp.coupling.orbits.period_map import period_map
-from vanedamp.coupling.orbits.problem import Problem
+from vanedamp.coupling.orbits.problem import OrbitProblem
 from vanedamp.coupling.orbits.waves import of_waves
 from vanedamp.coupling.scene.orbit import Orbit as Table
 from vanedamp.files.toml_input import InputError
@@ -180,10 +180,10 @@ def test_an_impact_passes_the_start_of_a_part_and_one_of_another_sector_its_end(
     scene = ring_scene(tmp_path / "ring.h5", 5, 2, 600)
     along, begin = period_map(scene, "excitation.force"), 0.0524171
     section, state = of_waves(along).later(find_orbit(scene).state, begin)
-    problem, table = Problem.along(replace(section, earlier=[]), 24.951, -0.005), {"from": 24.951, "to": 24.946}
+    problem, table = OrbitProblem.along(replace(section, earlier=[]), 24.951, -0.005), {"from": 24.951, "to": 24.946}
     found = solve(problem, problem.pack(state, 24.951), problem.row())
-    path = Continuation(
-        Table(**table, step=0.3, min_step=0.1, max_step=1.0, max_points=9), Point(problem, found, problem.row())
+    path = BranchPath(
+        Table(**table, step=0.3, min_step=0.1, max_step=1.0, max_points=9), CurvePoint(problem, found, problem.row())
     )
     while not path.end:
         path.advance()
@@ -219,7 +219,7 @@ def test_a_border_of_waves_is_that_of_orbits_of_whole_periods(tmp_path):
         np.array([low, 25.0]),
         np.array([high - low, 0.1]),
     )
-    problem = Problem(whole, paths, origin, span)
+    problem = OrbitProblem(whole, paths, origin, span)
     y = problem.pack(border.state[1], float(border.parameter[1]), float(border.second[1]))
     found = first_point(Peak(problem, 0, np.eye(problem.size + 1)[-1]), y + 1e-3 * problem.row(-2))
     assert problem.numbers(found.y)[0] == pytest.approx(border.parameter[1], rel=1e-8)

@@ -13,7 +13,7 @@ import pytest
 from tests.tools.processes import environment
 from tests.tools.sweep_processes import RESONANCE, command, kill_after_a_flush, scene, write
 from vanedamp.coupling.sweep import schedule
-from vanedamp.coupling.sweep.checkpoint import Checkpoint
+from vanedamp.coupling.sweep.checkpoint import SweepCheckpoint
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
 from vanedamp.coupling.sweep.worker import run_points
@@ -173,7 +173,7 @@ def test_a_full_file_system(tmp_path):
         with pytest.raises(StoreError, match=r"sweep.h5: cannot be written \(No space left on device\)"):
             sweep(scene(), checkpoint=disk / "sweep.partial").save(disk / "sweep.h5")
         assert sorted(path.name for path in disk.iterdir()) == ["others", "sweep.partial"]
-        assert Checkpoint(disk / "sweep.partial", scene(), 12, {}).finished.count == 12
+        assert SweepCheckpoint(disk / "sweep.partial", scene(), 12, {}).finished.count == 12
     finally:
         subprocess.run(["umount", str(disk)], check=True)
 

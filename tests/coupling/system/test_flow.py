@@ -5,7 +5,7 @@ import pytest
 
 from tests.reference.flows import flow as reference
 from tests.tools.sensitive_scenes import KINDS, scene_of
-from vanedamp.coupling.derivatives.dynamics import Dynamics
+from vanedamp.coupling.derivatives.dynamics import ScaledDynamics
 from vanedamp.coupling.derivatives.frame import Frame
 from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.numerics import codes
@@ -27,7 +27,7 @@ PERIODS, MOST_EVENTS = 4, 20000
 def test_generators_and_forces_of_every_state_that_a_run_meets(seed, tmp_path):
     _, scene = scene_of(seed, tmp_path)
     frame = Frame(scene)
-    dynamics, system = Dynamics(frame, frame.sizes()), frame.system
+    dynamics, system = ScaledDynamics(frame, frame.sizes()), frame.system
     run = engine_run(system, start_of(scene, system), new_records(system, PERIODS, 0), True, MOST_EVENTS)
     met = {segment.state.tobytes() + segment.open_force.tobytes(): segment for segment in Walk(run, PERIODS)}
     assert met

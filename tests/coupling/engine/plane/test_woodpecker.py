@@ -11,7 +11,7 @@ from tests.tools.planar import Run, ledger
 from vanedamp.coupling.response.records import IMPACT, new_records
 from vanedamp.coupling.response.response import Status
 from vanedamp.coupling.response.restart import state_at
-from vanedamp.coupling.system.assembly import Motion
+from vanedamp.coupling.system.assembly import Coordinates
 from vanedamp.coupling.system.system import LEFT, RIGHT, System
 
 SLEEVE, BIRD = (3e-4, 5e-9), (4.5e-3, 7e-7)  # mass, moment of inertia: kg, kg m^2
@@ -60,7 +60,9 @@ def test_its_limit_cycle_takes_146_ms():
     # near the limit cycle, as the sleeve's lower edge has come to the pole
     q, v = np.array([0.0, -(R_M - R_0) / H_M, -0.2788]), np.array([-0.3411, 0.0, -7.4583])
     periods = 60
-    run = Run(system, state_at(system, Motion(root.T @ q, root.T @ v)), new_records(system, periods, 0), True, 10**6)
+    run = Run(
+        system, state_at(system, Coordinates(root.T @ q, root.T @ v)), new_records(system, periods, 0), True, 10**6
+    )
     assert run.advance_to(periods) is Status.OK
     impacts = run.events(IMPACT)
     beak = impacts[(impacts[:, 2] == 0) & (impacts[:, 3] < -0.05)]
