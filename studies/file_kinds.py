@@ -16,6 +16,7 @@ from vanedamp.files.toml_input import InputError, read_toml
 KINDS = {
     kind.name: kind
     for kind in (
+        FileKind("design", "vanedamp.studies.design.tables:DesignFile", ("envelope", "requirements", "operation")),
         FileKind(
             "pipeline",
             "vanedamp.studies.pipeline.tables:PipelineFile",
@@ -34,7 +35,6 @@ KINDS = {
             ("deviations",),
             command="identify",
         ),
-        FileKind("design", "vanedamp.studies.design.tables:DesignFile", ("envelope", "requirements", "operation")),
         FileKind("life", "vanedamp.studies.life.study:LifeFile", ("life",)),
         FileKind("study", "vanedamp.studies.optimisation.tables:StudyFile", ("optimise",), command="optimise"),
         FileKind("contact", "vanedamp.coupling.strength.contact_numbers:ContactFile", ("pair",)),

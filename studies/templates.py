@@ -8,17 +8,16 @@ from typing import Any
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.system.resonance import Resonance, chosen_resonance
+from vanedamp.coupling.system.resonance import chosen_resonance
 from vanedamp.files.toml_input import InputError, validate
 from vanedamp.rom.reduced import NORMAL, ROTATION, ReducedModel
 from vanedamp.studies.case.tables import Case
 from vanedamp.studies.demo.figure_file import FigureStructure
 from vanedamp.studies.hot_spots import plus_minus
+from vanedamp.studies.model_scene import contact_stiffness, on_model, rounded
 
 #: mass of the body over the structure's, and its gap over the amplitude without bodies
 _MASS_RATIO, _GAP_RATIO = 0.02, 0.5
-#: frequency of a body on its contact over the resonance's, at least and at most
-_STIFFNESS = (10.0, 30.0)
 #: relative to the natural frequency: a run in which the body is active, and the ends of a sweep and of a study's band
 _RUN, _SWEEP, _BAND = 0.988, (0.96, 1.02), (0.975, 1.01)
 
@@ -79,7 +78,7 @@ def template(kind: str, file: Path, rom: Path | None = None, case: Path | None =
     if kind == "scene":
         return data, {"": _SCENE_NOTE.format(file=file.name)} | _notes(rom)
     del data["sweep"]
-    low, high = (_rounded(share / _RUN * data["excitation"]["frequency"]) for share in _BAND)
+    low, high = (rounded(share / _RUN * data["excitation"]["frequency"]) for share in _BAND)
     data["time"] = {"periods": 500, "transient": 400}
     data["optimise"] = {
         "band": {"start": low, "stop": high, "num": 12}, "samples": 4, "evaluations": 10,
@@ -122,13 +121,13 @@ def _case(file: Path) -> Template:
 def _design(file: Path, case: Path | None) -> Template:
     """Return a design for a case: an envelope about good dampers of the shipped cluster, and common requirements."""
     shipped = FigureStructure.shipped()
-    ends = [_rounded(share * shipped.amplitude, 2) for share in (0.1, 2.0)]
+    ends = [rounded(share * shipped.amplitude, 2) for share in (0.1, 2.0)]
     data: dict[str, Any] = {
         "case": "case.toml" if case is None else _beside(case, file.parent),
         "folder": file.stem,
         "operation": {"hours": 10_000.0},
         "envelope": {
-            "bodies": [1, 2, 4], "mass": [_rounded(share * shipped.mass, 2) for share in (0.01, 0.04)], "gap": ends,
+            "bodies": [1, 2, 4], "mass": [rounded(share * shipped.mass, 2) for share in (0.01, 0.04)], "gap": ends,
             "gap_tolerance": 2e-6, "mass_tolerance": 0.03, "orientation_deg": [0.0, 90.0], "friction": [0.2, 0.6],
             "restitution": [0.4, 0.8],
         },
@@ -149,10 +148,10 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
     blocks: use blocks where a reduced model has the motion and the size of their cavity; these runs take longer.
     """
     shipped = FigureStructure.shipped()
-    amplitude = _rounded(shipped.amplitude, 2)
+    amplitude = rounded(shipped.amplitude, 2)
     if rom is None:
         structure = {
-            "model": "rigid", "mass": _rounded(shipped.mass), "stiffness": _rounded(shipped.stiffness),
+            "model": "rigid", "mass": rounded(shipped.mass), "stiffness": rounded(shipped.stiffness),
             "damping_ratio": shipped.damping_ratio,
         }  # fmt: skip
         location: dict[str, Any] = {}
@@ -160,28 +159,28 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
         near = [shipped.frequency] * 2
     else:
         model = ReducedModel.load(rom)
-        structure, location, cavities, near = _on_model(model, rom)
+        structure, location, cavities, near = on_model(model, rom)
         if (level := model.provenance.get("fatigue")) is not None:
             location["at"], near = level["at"], [level["frequency_hz"]] * 2
-            amplitude = _rounded(level["amplitude"], 2)
+            amplitude = rounded(level["amplitude"], 2)
     excitation = location | {"frequency": near[0], "resonance_amplitude": amplitude}
     moving: dict[str, Any] = {"structure": structure, "excitation": excitation | {"resonance_near": near}}
     moving["cavity"] = [cavity | {"gap": amplitude} for cavity in cavities]
     resonance = chosen_resonance(validate(Scene, moving, str(rom or file)))
     if rom is not None:
         structure["file"] = _beside(rom, file.parent)
-    mass, gap = _rounded(_MASS_RATIO * resonance.mass / len(cavities)), _rounded(_GAP_RATIO * amplitude)
-    frequencies = [_rounded(share * resonance.frequency) for share in (_RUN, *_SWEEP)]
+    mass, gap = rounded(_MASS_RATIO * resonance.mass / len(cavities)), rounded(_GAP_RATIO * amplitude)
+    frequencies = [rounded(share * resonance.frequency) for share in (_RUN, *_SWEEP)]
     bodies: list[dict[str, Any]] = [
         {"cavity": cavity["name"], "mass": mass, "friction": 0.4, "restitution": 0.7} for cavity in cavities
     ]
     contact: dict[str, Any] = {}
     if rom is not None:
-        contact = {"contact": {"law": "compliant", "stiffness": _contact_stiffness(model, cavities, resonance, mass)}}
+        contact = {"contact": {"law": "compliant", "stiffness": contact_stiffness(model, cavities, resonance, mass)}}
         for cavity, body in zip(cavities, bodies, strict=True):
             if blocks and (size := _pocket(model, cavity["floor"])) is not None:
                 cavity["play"] = gap
-                length, height = (_rounded(extent - gap) for extent in size)
+                length, height = (rounded(extent - gap) for extent in size)
                 body |= {"shape": "block", "length": length, "height": height}
     points = 21 if any("shape" in body for body in bodies) else 61  # blocks take longer
     return {
@@ -193,56 +192,10 @@ def _scene(file: Path, rom: Path | None, blocks: bool) -> dict[str, Any]:
         "gravity": {"acceleration": 9.81, "orientation_deg": 0.0},
         "time": {"periods": 1500, "transient": 1000},
         "sweep": {
-            "cavity.gap": [gap, _rounded(gap / 5)],
+            "cavity.gap": [gap, rounded(gap / 5)],
             "excitation.frequency": {"start": frequencies[1], "stop": frequencies[2], "num": points},
         },
     }
-
-
-def _on_model(
-    model: ReducedModel, rom: Path
-) -> tuple[dict[str, Any], dict[str, Any], list[dict[str, Any]], list[float]]:
-    """Return structure, place of the force, cavities and range of the natural frequencies (Hz) of a reduced model.
-
-    The force is at the label "shroud" or the first one; a cavity is where labels NAME_floor, NAME_left and NAME_right
-    are, or a label NAME with its motion across, or else at the force.
-    """
-    arms = np.zeros(len(model.interface)) if model.arms is None else model.arms
-    labels = [label for label, arm in zip(model.interface, arms, strict=True) if not arm and not label.endswith(NORMAL)]
-    if not labels:
-        raise InputError(f"{rom}: its interface has no displacement that a body could slide on")
-    at = "shroud" if "shroud" in labels else labels[0]
-    floors = {label.removesuffix("_floor"): label for label in labels if label.endswith("_floor")}
-    floors = floors or {label: label for label in labels if label + NORMAL in model.interface} or {"c1": at}
-    cavities = [
-        {"name": name, "floor": floor}
-        | {side: f"{name}_{side}" for side in ("left", "right") if f"{name}_{side}" in labels}
-        for name, floor in floors.items()
-    ]
-    frequencies = model.natural_frequencies_hz[model.rigid_modes :]
-    if not frequencies.size:
-        raise InputError(f"{rom}: has rigid motions only; there is no resonance to reduce")
-    structure = {"model": "rom", "file": str(rom.resolve())}
-    return structure, {"at": at}, cavities, [float(frequencies[0]), float(frequencies[-1])]
-
-
-def _contact_stiffness(model: ReducedModel, cavities: list[dict[str, Any]], resonance: Resonance, mass: float) -> float:
-    """Return the stiffness of a contact, N/m: the static stiffness of the softest wall, without the resonance.
-
-    Body and contact alone vibrate at _STIFFNESS times the resonance's frequency at least and at most: softer contacts
-    overlap by much of the gap, stiffer ones only increase the run time.
-    """
-    labels = {cavity.get(side, cavity["floor"]) for cavity in cavities for side in ("left", "right")}
-    rows = [model.interface.index(label) for label in labels]
-    squares, shapes = model.natural
-    elastic = np.arange(model.size) >= model.rigid_modes
-    resonant = np.argmin(np.where(elastic, abs(model.natural_frequencies_hz - resonance.frequency), np.inf))
-    elastic[resonant] = False
-    flexible = ((model.selection[rows] @ shapes[:, elastic]) ** 2 / squares[elastic]).sum(axis=1)
-    if model.residual_flexibility is not None:
-        flexible += np.diag(model.residual_flexibility)[rows]
-    low, high = (mass * (2 * np.pi * ratio * resonance.frequency) ** 2 for ratio in _STIFFNESS)
-    return _rounded(1.0 / min(max(flexible.max(), 1.0 / high), 1.0 / low), 2)
 
 
 def _pocket(model: ReducedModel, label: str) -> tuple[float, float] | None:
@@ -266,7 +219,3 @@ def _beside(file: Path, folder: Path) -> str:
     """Return the path of a file relative to a folder."""
     file, folder = file.resolve(), folder.resolve()
     return str(file.relative_to(folder) if file.is_relative_to(folder) else file)
-
-
-def _rounded(value: float, digits: int = 4) -> float:
-    return float(f"{value:.{digits}g}")

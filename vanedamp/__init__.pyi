@@ -91,7 +91,7 @@ from vanedamp.studies.identification.study import IdentificationStudy as Identif
 from vanedamp.studies.identification.density import LogDensity as LogDensity
 
 # Design: optimisation within tolerances, wear and life
-from vanedamp.studies.design.design import design as design
+from vanedamp.studies.pipeline.design import design as design
 from vanedamp.studies.design.record import DesignRecord as DesignRecord
 from vanedamp.studies.optimisation.search import optimise as optimise
 from vanedamp.studies.optimisation.study import Study as Study

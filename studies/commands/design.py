@@ -8,10 +8,10 @@ from functools import partial
 
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.outputs import check_outputs, output_folder
-from vanedamp.studies.design.design import folder_of
-from vanedamp.studies.design.design import run as run_design
 from vanedamp.studies.design.record import DesignRecord
-from vanedamp.studies.design.stages import DESIGN
+from vanedamp.studies.pipeline.design import folder_of
+from vanedamp.studies.pipeline.design import run as run_design
+from vanedamp.studies.pipeline.design_stages import DESIGN
 
 
 def run(arguments: Namespace) -> None:

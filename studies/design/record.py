@@ -69,6 +69,8 @@ class DesignRecord(Record):
     """SHA-256 of the user's files, by their names"""
     sentence: str
     """the answer in words"""
+    modes: str
+    """file of the modes, in the same folder"""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -16,7 +16,7 @@ from vanedamp.coupling.system.transient import settled_after
 from vanedamp.files.toml_input import InputError, plain, tables
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.design.tables import DesignFile
-from vanedamp.studies.templates import template
+from vanedamp.studies.model_scene import contact_stiffness, on_model
 
 #: ends of the default band over the resonances with the heaviest bodies fixed and without bodies, and points per width
 _BAND, _PER_WIDTH = (0.985, 1.01), 1.5
@@ -58,24 +58,26 @@ class Devices:
         """
         self.study, self.rom, self.source = study, rom, source
         self._model = ReducedModel.load(rom)
-        data, _ = template("study", rom.parent / "study.toml", rom)
-        self._data = {name: data[name] for name in ("structure", "excitation", "contact", "gravity")}
-        self._data["structure"]["file"] = str(rom)
-        self.cavities = self._chosen(data["cavity"])
-        if study.contact is not None:
-            self._data["contact"] = plain(tables(study.contact))
+        structure, location, cavities, near = on_model(self._model, rom)
+        fatigue = self._model.provenance.get("fatigue")
+        if fatigue is not None:
+            location["at"], near = fatigue["at"], [fatigue["frequency_hz"]] * 2
+        excitation = location | {"frequency": near[0], "resonance_near": near} | self._level(study, fatigue)
+        self._data: dict[str, Any] = {"structure": structure, "excitation": excitation}
+        self.cavities = self._chosen(cavities)
+        envelope, self._time = study.envelope, {"periods": 2, "transient": 1}
+        middle = Device(envelope.bodies[0], envelope.mass[1] / envelope.bodies[0], envelope.gap[0])
+        resonance = chosen_resonance(self.at(middle, LEVELS[0]))
+        self.frequency, self.mass = resonance.frequency, resonance.mass
+        excitation["resonance_near"] = [resonance.frequency] * 2
+        stiffness = contact_stiffness(self._model, self.cavities, resonance, envelope.mass[1] / envelope.bodies[0])
+        compliant = {"law": "compliant", "stiffness": stiffness}
+        self._data["contact"] = compliant if study.contact is None else plain(tables(study.contact))
         if study.wear is not None:
             self._data["wear"] = plain(tables(study.wear))
-        self._set_level(study)
-        envelope = study.envelope
-        middle = Device(envelope.bodies[0], envelope.mass[1] / envelope.bodies[0], envelope.gap[0])
-        self._time = {"periods": 2, "transient": 1}
-        scene = self.at(middle, LEVELS[0])
-        resonance = chosen_resonance(scene)
-        self.frequency, self.mass = resonance.frequency, resonance.mass
-        self._data["excitation"]["resonance_near"] = [resonance.frequency] * 2
         self.frequencies = self._band()
         self._data["excitation"]["frequency"] = float(self.frequencies[0])
+        scene = self.at(middle, LEVELS[0])
         dropped = max(
             settled_after(scene.replace({"excitation.frequency": float(end)}), range(1, _LONGEST))
             for end in self.frequencies[[0, -1]]
@@ -94,21 +96,18 @@ class Devices:
                 )
         return [known[name] for name in self.study.envelope.cavities or known]
 
-    def _set_level(self, study: DesignFile) -> None:
-        """Put the level of the excitation into the scene's tables."""
-        excitation, level = self._data["excitation"], study.operation.level
-        del excitation["resonance_amplitude"]
-        fatigue = self._model.provenance.get("fatigue")
-        if "fatigue_fraction" in level or not level:
-            if fatigue is None:
-                raise InputError(
-                    f"{self.source}: operation: a level is missing; give force, base_acceleration or "
-                    "resonance_amplitude, or the case a material.fatigue_strength"
-                )
-            given = level.get("fatigue_fraction", fatigue["share"])
-            excitation["resonance_amplitude"] = fatigue["amplitude"] * given / fatigue["share"]
-        else:
-            excitation |= level
+    def _level(self, study: DesignFile, fatigue: dict[str, Any] | None) -> dict[str, float]:
+        """Return the level of the excitation, with the amplitude at the case's fatigue strength if it is known."""
+        level = study.operation.level
+        if level and "fatigue_fraction" not in level:
+            return level
+        if fatigue is None:
+            raise InputError(
+                f"{self.source}: operation: a level is missing; give force, base_acceleration or "
+                "resonance_amplitude, or the case a material.fatigue_strength"
+            )
+        given = level.get("fatigue_fraction", fatigue["share"])
+        return {"resonance_amplitude": fatigue["amplitude"] * given / fatigue["share"]}
 
     def _band(self) -> np.ndarray:
         """Return the frequencies of the band: the study's, or those from the fixed resonance to the free one."""
@@ -140,7 +139,7 @@ class Devices:
         return {
             **self._data,
             "structure": self._data["structure"] | modes,
-            "gravity": self._data["gravity"] | {"orientation_deg": middle["orientation_deg"]},
+            "gravity": {"acceleration": 9.81, "orientation_deg": middle["orientation_deg"]},
             "cavity": [entry | cavity for entry in self.cavities],
             "damper": [{"cavity": names[index], **body} for index in order],
             "time": dict(self._time),

@@ -12,7 +12,6 @@ import plotly.graph_objects as go
 from vanedamp.files import store
 from vanedamp.studies.design.record import NAMES, DesignRecord
 from vanedamp.studies.design.verdict import HeldValue
-from vanedamp.studies.pipeline.tables import MODES
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.pictures import mode_picture
@@ -48,7 +47,7 @@ def shown(file: str, record: DesignRecord, page: Page) -> dict[str, Any]:
     chart = page.chart("design", dressed(figure(record), height=380), ("frequency", *_CURVES.values()), rows, [file])
     at = [_number(path, value) for path, value in record.at.items() if path in NAMES]
     return {
-        "record": record, "file": file, "chart": chart, "picture": _picture(Path(file).with_name(MODES)),
+        "record": record, "file": file, "chart": chart, "picture": _picture(Path(file).with_name(record.modes)),
         "rows": [_row(value) for value in record.held], "at": at, "drawing": _drawing(record),
         "sensitive": [(NAMES[path], added / record.held[0].value) for path, added in record.by_number.items()],
     }  # fmt: skip

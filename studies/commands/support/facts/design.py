@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.design.design import run
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.facts import Fact
+from vanedamp.studies.pipeline.design import run
 
 
 def facts(path: str | Path) -> list[Fact]:

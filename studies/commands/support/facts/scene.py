@@ -26,9 +26,9 @@ from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.coupling.system.transient import left_over, timed
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, part_doubts, sweep_doubts
-from vanedamp.studies.jobs.trial import mean_cost, tried
 from vanedamp.studies.facts import Fact
 from vanedamp.studies.jobs.budget import beginning, check_run, check_sweep, exponent_seconds, points_of
+from vanedamp.studies.jobs.trial import mean_cost, tried
 from vanedamp.studies.jobs.workers import available_cores
 from vanedamp.studies.scene_checks import load_scene
 

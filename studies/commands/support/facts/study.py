@@ -9,9 +9,9 @@ from vanedamp.coupling.scene.units import unit_of
 from vanedamp.coupling.sweep.grid import Points
 from vanedamp.coupling.system.transient import timed
 from vanedamp.studies.commands.support.facts.scene import facts_of
-from vanedamp.studies.jobs.trial import mean_cost, tried
 from vanedamp.studies.facts import Fact
 from vanedamp.studies.jobs.budget import check_optimise, designs_of, scenes_of
+from vanedamp.studies.jobs.trial import mean_cost, tried
 from vanedamp.studies.jobs.workers import available_cores
 from vanedamp.studies.optimisation.study import Study
 from vanedamp.studies.optimisation.tables import NO_DEVIATION

@@ -238,6 +238,7 @@ def decided(
         measure=measurement(by_number, best.amplitude, study),
         hashes={file.name: digest(file) for file in files},
         sentence=sentence_of(best.chosen, grade, best.ratio, best.at, failing),
+        modes=MODES,
         provenance={"versions": versions()},
     )  # fmt: skip
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.design.record import DesignRecord
-from vanedamp.studies.design.stages import DESIGN, design_stages
 from vanedamp.studies.design.tables import DesignFile
+from vanedamp.studies.pipeline.design_stages import DESIGN, design_stages
 from vanedamp.studies.pipeline.pipeline import PipelineResult, run_stages
 
 
