@@ -10,10 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.strength.assessment import fatigue_of
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_peaks
 from vanedamp.coupling.system.resonance import chosen_resonance
 from vanedamp.coupling.system.transient import settled_after
 from vanedamp.files.toml_input import InputError, plain, tables
+from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.model_scene import contact_stiffness, on_model
@@ -21,6 +24,8 @@ from vanedamp.studies.model_scene import contact_stiffness, on_model
 #: ends of the default band over the resonances with the heaviest bodies fixed and without bodies, and points per width
 _BAND, _PER_WIDTH = (0.985, 1.01), 1.5
 _FEWEST, _MOST = 15, 60
+#: range of that resonance, over its frequency
+_NEAR = (0.99, 1.01)
 #: damping ratio by which the band is spaced where the model has none
 _DAMPING = 1e-3
 #: periods that are evaluated, and longest transient
@@ -69,7 +74,7 @@ class Devices:
         middle = Device(envelope.bodies[0], envelope.mass[1] / envelope.bodies[0], envelope.gap[0])
         resonance = chosen_resonance(self.at(middle, LEVELS[0]))
         self.frequency, self.mass = resonance.frequency, resonance.mass
-        excitation["resonance_near"] = [resonance.frequency] * 2
+        excitation["resonance_near"] = [share * resonance.frequency for share in _NEAR]
         stiffness = contact_stiffness(self._model, self.cavities, resonance, envelope.mass[1] / envelope.bodies[0])
         compliant = {"law": "compliant", "stiffness": stiffness}
         self._data["contact"] = compliant if study.contact is None else plain(tables(study.contact))
@@ -83,8 +88,34 @@ class Devices:
             for end in self.frequencies[[0, -1]]
         )
         self._time = {"periods": dropped + _EVALUATED, "transient": dropped}
+        for level in (LEVELS[0], None):
+            self._check(middle, level)
+        self._check_requirements()
         self.scene = self.at(middle, LEVELS[0])
         self.amplitude = float(linear_peaks(self.scene, *map(float, self.frequencies[[0, -1]]))[0].amplitude)
+
+    def _check(self, device: Device, level: int | None) -> None:
+        """Raise InputError, naming the study, for a device that its model or its cavities do not take."""
+        try:
+            assemble(self.at(device, level))
+        except InputError as error:
+            raise InputError(f"{self.source}: envelope: {error}") from None
+
+    def _check_requirements(self) -> None:
+        """Raise InputError for requirements of results that are not computed."""
+        must, spots = self.study.requirements, hot_spots(self._model)
+        materials = [fatigue_of(facts) for facts in spots.values()]
+        if must.utilisation is not None and (not materials or None in materials):
+            raise InputError(
+                f"{self.source}: requirements.utilisation: no stress over a strength is computed; give effort.hot_spots, "
+                "and the case a material.fatigue_strength"
+            )
+        lives = bool(materials) and all(one is not None and one.exponent is not None for one in materials)
+        if must.hours is not None and not lives and self.study.wear is None:
+            raise InputError(
+                f"{self.source}: requirements.hours: no life is computed; give [wear], or effort.hot_spots and the case "
+                "[material.fatigue] with exponent and knee"
+            )
 
     def _chosen(self, cavities: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Return the cavities that may hold bodies, without their gaps."""

@@ -46,16 +46,18 @@ class HeldValue:
 
     @property
     def grade(self) -> str:
-        """Green: the whole interval is within the limit; red: the value is not; amber: else, or if it is doubtful."""
+        """Green: the whole interval is within the limit; red: the value is not; amber: else.
+
+        A doubtful result is never green, and red only if its whole interval is beyond the limit.
+        """
         if self.limit is None:
             return ""
-        sign = -1.0 if self.least else 1.0
-        sure = self.low if self.least else self.high
-        if self.doubtful:
-            return AMBER
-        if sign * self.value > sign * self.limit:
+        sign, limit = (-1.0, -self.limit) if self.least else (1.0, self.limit)
+        best, worst = (self.high, self.low) if self.least else (self.low, self.high)
+        surely = best if self.doubtful else self.value
+        if surely is not None and sign * surely > limit:
             return RED
-        return GREEN if sure is not None and sign * sure <= sign * self.limit else AMBER
+        return GREEN if worst is not None and sign * worst <= limit and not self.doubtful else AMBER
 
     @property
     def margin(self) -> float | None:
@@ -95,7 +97,7 @@ def overall(values: Sequence[HeldValue]) -> str:
 
 def _rise(worst: Confirmation) -> float:
     """Return by how much amplitudes may exceed the largest one that was found, relative to it."""
-    return (worst.missed + abs(worst.level_difference)) / worst.amplitude if worst.amplitude > 0.0 else 0.0
+    return worst.expected / worst.amplitude - 1.0 if worst.amplitude > 0.0 else 0.0
 
 
 def _amplitudes(study: DesignFile, worst: Confirmation) -> Iterator[HeldValue]:
@@ -108,7 +110,7 @@ def _amplitudes(study: DesignFile, worst: Confirmation) -> Iterator[HeldValue]:
         ("largest amplitude over that without bodies", "1", worst.reference, requirements.amplitude_ratio),
     ):
         value, source = worst.amplitude / over, f"{WORST}: {amplitude_max_dynamic.name}"
-        yield HeldValue(name, unit, value, value, upper / over, due, source, limit, doubtful=worst.failed > 0)
+        yield HeldValue(name, unit, value, value, _finite(upper / over), due, source, limit, doubtful=worst.failed > 0)
 
 
 def _stresses(study: DesignFile, worst: Confirmation, spots: Mapping[str, SpotFacts]) -> Iterator[HeldValue]:
@@ -123,7 +125,7 @@ def _stresses(study: DesignFile, worst: Confirmation, spots: Mapping[str, SpotFa
                 high = value * (1.0 + error) * (1.0 + _rise(worst))
                 unit = "Pa" if quantity == von_mises.name else "1"
                 yield HeldValue(
-                    f"{name} at {spot}", unit, value, value * (1.0 - error), high,
+                    f"{name} at {spot}", unit, value, max(value * (1.0 - error), 0.0), _finite(high),
                     f"mesh {_percent(spots[spot].error)}, draws, starts and modes {_percent(_rise(worst))}",
                     f"{SPOTS}: {quantity}", limit, doubtful=spots[spot].doubtful and limit is not None,
                 )  # fmt: skip
@@ -156,6 +158,10 @@ def _lives(
             "life of the damper", "h", end if lost is None else lost, end if early is None else early, late,
             "confidence of the runs, steps of the wear", f"{LIFE}: hours", study.hours, least=True,
         )  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _percent(fraction: float | None) -> str:

@@ -102,6 +102,11 @@ class Confirmation(Record):
         known = {entry["level"]: entry["amplitude"] for entry in self.levels}
         return float(known[None] - known[self.level])
 
+    @property
+    def expected(self) -> float:
+        """Largest amplitude that is to be expected, m: with what runs have missed, and the difference of the levels."""
+        return self.amplitude + self.missed + abs(self.level_difference)
+
     def by_number(self) -> list[tuple[str, float]]:
         """Return by path what a number's range adds to the largest amplitude, m, largest first.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from vanedamp.coupling.quantities.stress import damage_per_hour
 from vanedamp.coupling.scene.scene import Scene, relative
 from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.strength.assessment import fatigue_of
@@ -131,6 +132,8 @@ class Confirm(DesignStage):
 class Choose(DesignStage):
     """From the confirmed devices to the one to build, the scenes of its results, and the study of its life."""
 
+    KEYS = ("envelope", "operation", "contact", "wear", "effort", "requirements")
+
     def work(self, tools: Tools) -> str:
         """Write the files."""
         best, devices = ranked([Confirmation.load(path) for path in self.takes[1:]])[0], self.devices()
@@ -186,13 +189,8 @@ def tried(found: Optimisation) -> list[tuple[Device, float]]:
 
 def ranked(confirmed: Sequence[Confirmation]) -> list[Confirmation]:
     """Return devices by their largest amplitude that is to be expected; of equal ones fewer bodies come first."""
-    least = min(expected(one) for one in confirmed)
-    return sorted(confirmed, key=lambda one: (max(expected(one), (1.0 + _SAME) * least), one.chosen.bodies))
-
-
-def expected(one: Confirmation) -> float:
-    """Return the largest amplitude of a device that is to be expected, m."""
-    return one.amplitude + one.missed + abs(one.level_difference)
+    least = min(one.expected for one in confirmed)
+    return sorted(confirmed, key=lambda one: (max(one.expected, (1.0 + _SAME) * least), one.chosen.bodies))
 
 
 def estimated(devices: Devices) -> float:
@@ -234,7 +232,7 @@ def decided(
         levels=best.levels, level=best.level, at=best.at, by_number=by_number,
         frequency=best.frequency, undamped=best.undamped, fixed=best.fixed, worst=best.worst, reference=best.reference,
         runs=sum(one.runs for one in confirmed), failed=best.failed, unsure=best.unsure,
-        assumed=tuple(_assumed(study, devices, life)), neglected=tuple(_neglected(study, life)),
+        assumed=tuple(_assumed(study, devices, life)), neglected=tuple(_neglected(study, best, life)),
         measure=measurement(by_number, best.amplitude, study),
         hashes={file.name: digest(file) for file in files},
         sentence=sentence_of(best.chosen, grade, best.ratio, best.at, failing),
@@ -256,7 +254,7 @@ def spot_facts(rom: Path) -> dict[str, SpotFacts]:
 
 def _lost(best: Confirmation, other: Confirmation) -> dict[str, Any]:
     """Return another device, and why it lost."""
-    difference = expected(other) / expected(best) - 1.0
+    difference = other.expected / best.expected - 1.0
     why = f"largest amplitude to be expected {difference:+.0%}"
     if abs(difference) <= _SAME:
         why = f"as good within {_SAME:.0%}, with more bodies"
@@ -265,7 +263,7 @@ def _lost(best: Confirmation, other: Confirmation) -> dict[str, Any]:
     return {
         "device": dict(other.device),
         "ratio": other.ratio,
-        "expected": expected(other) / other.reference,
+        "expected": other.expected / other.reference,
         "why": why,
     }
 
@@ -289,7 +287,11 @@ def _assumed(study: DesignFile, devices: Devices, life: LifeRecord | None) -> It
         yield "wear with friction, restitution and orientation in the middle of their ranges"
 
 
-def _neglected(study: DesignFile, life: LifeRecord | None) -> Iterator[str]:
+def _neglected(study: DesignFile, best: Confirmation, life: LifeRecord | None) -> Iterator[str]:
+    if not best.spots:
+        yield "stress of the vane (give effort.hot_spots)"
+    elif not any(damage_per_hour.name in spot for spot in best.spots.values()):
+        yield "life of the vane (give the case [material.fatigue] with exponent and knee)"
     if study.envelope.length is None:
         yield "bodies tilt and lift (give length and height of a body)"
     if life is None:

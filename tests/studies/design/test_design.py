@@ -182,7 +182,7 @@ def test_a_study_resumes_and_repeats_what_changed(finished, tmp_path, monkeypatc
     )
     assert main(["design", "design.toml", "--dry-run"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    starts = ("modal: kept", "search 2: kept", "confirm 1: kept", "confirm 2: runs", "decide: runs")
+    starts = ("modal: kept", "search 2: kept", "confirm 1: kept", "confirm 2: runs", "choose: runs", "decide: runs")
     for start in starts:
         assert any(line.startswith(start) for line in lines), start
     assert main(["check", "design.toml"]) == 0
@@ -212,6 +212,8 @@ def test_the_page_shows_every_result_with_its_source(finished):
         (0.6, 0.5, 0.7, False, False, RED),
         (0.4, 0.4, None, False, False, AMBER),
         (0.4, 0.4, 0.45, False, True, AMBER),
+        (0.6, 0.6, 0.7, False, True, RED),  # runs without a result only add to it
+        (0.6, 0.4, 0.7, False, True, AMBER),
         (0.6, 0.55, None, True, False, GREEN),
         (0.6, 0.4, None, True, False, AMBER),
         (0.4, 0.3, None, True, False, RED),
@@ -239,7 +241,28 @@ def test_draws_reach_the_corners():
     assert draws.max(axis=0).tolist() <= [1.0, 4.0]
 
 
-def test_levels_and_blocks(finished):
+@pytest.mark.parametrize(
+    ("case", "spots", "must", "error"),
+    [
+        (CASE, 0, {"utilisation": 1.0}, "requirements.utilisation: no stress over a strength is computed"),
+        (CASE.replace("[material.fatigue]\nexponent = 8.0\nknee = 2.0e6\n", ""), 1, {"hours": 9.0}, "requirements.hours: no life"),
+    ],
+)  # fmt: skip
+def test_a_requirement_of_what_is_not_computed_is_rejected(tmp_path, case, spots, must, error):
+    from vanedamp.studies.case.stages import reduction
+
+    (tmp_path / "case.toml").write_text(case)
+    (tmp_path / "design.toml").write_text(STUDY)
+    study = DesignFile.load(tmp_path / "design.toml")
+    model = reduction(vd.assemble(vd.Case.load(tmp_path / "case.toml")), 1, spots=spots)
+    model.save(tmp_path / "rom.h5")
+    model.save(tmp_path / "rom_plain.h5")
+    study = replace(study, wear=None, requirements=replace(study.requirements, **must))
+    with pytest.raises(InputError, match=re.escape(error)):
+        Devices(study, tmp_path / "rom.h5", "design.toml")
+
+
+def test_levels_and_cavities(finished):
     folder, _ = finished
     study = DesignFile.load(folder / "design.toml")
     rom = (folder / "out/rom.h5").resolve()
