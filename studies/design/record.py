@@ -50,7 +50,7 @@ class DesignRecord(Record):
     fixed: _Curve
     """amplitude with the bodies fixed"""
     worst: _Curve
-    """largest amplitude over all draws and starts"""
+    """largest amplitude over all draws, from rest, going up and going down"""
     reference: float
     """maximum without bodies [m]"""
     runs: int

@@ -33,7 +33,8 @@ class Operation:
     """Excitation of the vane, and for how long: one level key, or none for the case's fraction of the strength."""
 
     band: Range | None = None
-    """excitation frequencies {start, stop, num} (default: 15, from 2 % below the first bending to 1 % above it) [Hz]"""
+    """excitation frequencies {start, stop, num} (default: 15 to 60, from 1.5 % below the resonance with the heaviest
+    bodies fixed to 1 % above the one without bodies) [Hz]"""
     fatigue_fraction: Annotated[Real, Field(gt=0, le=1)] | None = None
     """fraction of the fatigue strength that the stress reaches at resonance without bodies (default: the case's) [-]"""
     force: Positive | None = None

@@ -54,7 +54,7 @@ class Confirmation(Record):
     fixed: Annotated[np.ndarray, Array(("frequency",), "m")]
     """amplitude with the bodies fixed"""
     worst: Annotated[np.ndarray, Array(("frequency",), "m")]
-    """largest amplitude of all draws and starts"""
+    """largest amplitude of all draws, from rest, going up and going down"""
     reference: float
     """maximum without bodies [m]"""
     numbers: tuple[str, ...]

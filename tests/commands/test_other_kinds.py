@@ -16,6 +16,7 @@ FILES = {
     "case": (BLOCK, "is a case ([mesh]): vanedamp modal "),
     "scene": (SCENE, "is a scene ([structure]): vanedamp run "),
     "study": (SCENE + OPTIMISE, "is a study ([optimise]): vanedamp optimise "),
+    "design": ("[envelope]\n", "is a design ([envelope]): vanedamp design "),
     "life": (SCENE + "[life]\nhours = 5.0\n", "is a life ([life]): vanedamp life "),
     "identification": (SCENE + "[numbers]\n", "is an identification ([numbers]): vanedamp identify "),
     "deviations": ("[deviations]\n", "is deviations ([deviations]): vanedamp identify "),

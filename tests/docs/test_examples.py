@@ -29,6 +29,7 @@ from vanedamp.studies.case.tables import Case
 from vanedamp.studies.cli import _parsers, main
 from vanedamp.studies.demo.demo import EFFORT
 from vanedamp.studies.demo.figure_file import FOLDER, FigureScenes, FigureStructure
+from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.identification.deviations import load_table
 from vanedamp.studies.identification.tables import IdentificationFile
 from vanedamp.studies.life.study import LifeStudy
@@ -100,6 +101,8 @@ def completed(tables: dict, folder: Path) -> dict:
     """Tables of an example with those that it leaves out."""
     if {"matrices", "numbers", "pair", "deviations"} & tables.keys():
         return tables
+    if "envelope" in tables:
+        return {"case": "case.toml"} | tables
     scene = {
         "structure",
         "contact",
@@ -149,6 +152,8 @@ def test_files_are_read(example, tmp_path):
     path.write_text(tomli_w.dumps(whole))
     if "matrices" in tables:
         assert External.read(path).interface.keys() == tables["interface"].keys()
+    elif "envelope" in tables:
+        assert validate(DesignFile, whole, "design").envelope.bodies == (1, 2)
     elif "numbers" in tables:
         assert len(validate(IdentificationFile, tables, "study").numbers) == 2
     elif "deviations" in tables:

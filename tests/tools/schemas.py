@@ -46,6 +46,6 @@ def kind_of(tables: dict[str, Any]) -> str:
     """The kind of a file, from its tables."""
     names = {
         "matrices": "external", "numbers": "identification", "optimise": "study", "mesh": "case", "report": "pipeline",
-        "life": "life", "deviations": "deviations",
+        "life": "life", "deviations": "deviations", "envelope": "design",
     }  # fmt: skip
     return next((kind for table, kind in names.items() if table in tables), "scene")
