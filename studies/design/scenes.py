@@ -107,14 +107,14 @@ class Devices:
         materials = [fatigue_of(facts) for facts in spots.values()]
         if must.utilisation is not None and (not materials or None in materials):
             raise InputError(
-                f"{self.source}: requirements.utilisation: no stress over a strength is computed; give effort.hot_spots, "
-                "and the case a material.fatigue_strength"
+                f"{self.source}: requirements.utilisation: no stress over a strength is computed; give "
+                "effort.hot_spots, and the case a material.fatigue_strength"
             )
         lives = bool(materials) and all(one is not None and one.exponent is not None for one in materials)
         if must.hours is not None and not lives and self.study.wear is None:
             raise InputError(
-                f"{self.source}: requirements.hours: no life is computed; give [wear], or effort.hot_spots and the case "
-                "[material.fatigue] with exponent and knee"
+                f"{self.source}: requirements.hours: no life is computed; give [wear], or effort.hot_spots and the "
+                "case [material.fatigue] with exponent and knee"
             )
 
     def _chosen(self, cavities: list[dict[str, Any]]) -> list[dict[str, Any]]:
