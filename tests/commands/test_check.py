@@ -314,7 +314,7 @@ def test_sweeps_make_a_pipeline(tmp_path, capfd):
             changed(SCENE, ("{start = 15.4, stop = 16.2, num = 4}", "[]")),
             "sweep.excitation.frequency: expected at least 1 entries, not 0",
         ),
-        (changed(BLOCK, ("length = 0.1", "length = '1'")), "length: expected a number, not '1'"),
+        (changed(BLOCK, ("length = 0.1", "length = '1'")), "mesh.length: should be a valid number (got '1')"),
         ("[matrices]\nmass = 'm.npz'\n", "matrices.stiffness: missing"),
     ],
 )

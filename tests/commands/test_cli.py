@@ -338,7 +338,7 @@ def test_newtons_law_on_several_modes_is_told(command, tables, modes, told, fold
         (["report", "case.toml", "-o", "report.html"], "case.toml: is a case ([mesh]): vanedamp modal"),
         (
             ["report", ".", "-o", "report.html"],
-            "no results that a report shows (modes, system-matrices, ",
+            "no results that a report shows (design, modes, system-matrices, ",
         ),
         (["report", "nowhere", "-o", "report.html"], "nowhere: no such file or folder"),
         (["report", ".", "-o", "report.pdf"], "expected a file name ending in .html"),

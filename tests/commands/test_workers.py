@@ -67,4 +67,4 @@ def test_two_workers_find_what_one_finds(name, tmp_path, monkeypatch):
 def test_every_command_with_workers_is_tried():
     having = {command.NAME for command in COMMANDS if workers in getattr(command, "arguments", ())}
     # their stages are these commands'; the explorer's and the demo's have tests with two
-    assert having - {"pipeline", "explore", "demo"} == {name.split()[0] for name in INPUTS}
+    assert having - {"pipeline", "design", "explore", "demo"} == {name.split()[0] for name in INPUTS}

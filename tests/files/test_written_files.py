@@ -25,6 +25,7 @@ FILES = sorted(path.stem for path in WRITTEN.glob("*.h5"))
 TIMES = {"wall_time_s", "points_per_second", "points_resumed", "resonance"}
 OF_COMMANDS = {
     "calibration": {"status", "tuning"},
+    "design": {"status", "stages"},
     "modes": {
         "cavity", "effective_mass", "fatigue", "first_bending", "first_bending_number", "movable_mass", "rigid",
         "solver", "warnings",

@@ -12,39 +12,30 @@ import plotly.graph_objects as go
 from vanedamp.files import store
 from vanedamp.studies.design.record import NAMES, DesignRecord
 from vanedamp.studies.design.verdict import HeldValue
-from vanedamp.studies.report.charts import COLOURS, dressed
+from vanedamp.studies.kinds.confirmation.page import CURVES, curves_figure
+from vanedamp.studies.report.charts import dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.pictures import mode_picture
 
 ORDER = 1
 #: units of results on the page: name and factor
 _UNITS = {"m": ("µm", 1e6), "Pa": ("MPa", 1e-6), "h": ("h", 1.0), "1": ("", 1.0)}
-_CURVES = {"without bodies": "undamped", "bodies fixed": "fixed", "worst of all starts and draws": "worst"}
 
 
 def figure(record: DesignRecord) -> go.Figure:
     """Draw the worst curve of the device, the curves without bodies and with bodies fixed, and the limit."""
-    drawn = go.Figure()
-    for number, (name, field) in enumerate(_CURVES.items()):
-        line = {"color": COLOURS[-1 - number] if number < 2 else COLOURS[0], "dash": ("dot", "dash", "solid")[number]}
-        drawn.add_scatter(x=record.frequency, y=1e6 * getattr(record, field), mode="lines", name=name, line=line)
+    drawn = curves_figure(record, record.held[0].value)
     for value in record.held:
         if value.limit is not None and value.name.startswith("largest amplitude"):
             height = value.limit * (1.0 if value.unit == "m" else record.reference)
             drawn.add_hline(y=1e6 * height, line={"dash": "dash", "color": "#be185d"}, annotation_text="limit")
-    drawn.add_scatter(
-        x=[record.at["frequency"]], y=[1e6 * record.held[0].value], mode="markers", name="worst point",
-        marker={"size": 9, "color": COLOURS[1]},
-    )  # fmt: skip
-    drawn.update_xaxes(title_text="excitation frequency, Hz")
-    drawn.update_yaxes(title_text="largest amplitude, µm", rangemode="tozero")
     return drawn
 
 
 def shown(file: str, record: DesignRecord, page: Page) -> dict[str, Any]:
     """Return the parts of the sheet."""
-    rows = zip(record.frequency, *(getattr(record, field) for field in _CURVES.values()), strict=True)
-    chart = page.chart("design", dressed(figure(record), height=380), ("frequency", *_CURVES.values()), rows, [file])
+    rows = zip(record.frequency, *(getattr(record, field) for field in CURVES.values()), strict=True)
+    chart = page.chart("design", dressed(figure(record), height=380), ("frequency", *CURVES.values()), rows, [file])
     at = [_number(path, value) for path, value in record.at.items() if path in NAMES]
     return {
         "record": record, "file": file, "chart": chart, "picture": _picture(Path(file).with_name(record.modes)),
