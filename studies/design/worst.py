@@ -71,7 +71,7 @@ class Confirmation(Record):
     """by which runs that were not made may exceed it [m]"""
     at: Mapping[str, Any]
     """frequency [Hz], start, and numbers of the largest amplitude"""
-    scene: Mapping[str, Any]
+    worst_scene: Mapping[str, Any]
     """the scene of the largest amplitude, with a [sweep] where its start is that of a sweep"""
     spots: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """by hot spot: largest stress [Pa], utilisation, and damage per hour weighted over the band, of the worst draw on
@@ -238,7 +238,7 @@ def confirm(
     return Confirmation(
         device=device._asdict(), level=level, levels=levels, frequency=band, undamped=linear[0], fixed=linear[1],
         worst=runs.curve, reference=devices.amplitude, numbers=tuple(paths), draws=draws, of_draws=of_draws,
-        of_starts=of_starts, amplitude=runs.amplitude, missed=_missed(of_starts), at=runs.at, scene=runs.scene,
+        of_starts=of_starts, amplitude=runs.amplitude, missed=_missed(of_starts), at=runs.at, worst_scene=runs.scene,
         spots=spots, spot_scene=spot_scene, runs=runs.done, failed=runs.failed, unsure=runs.unsure,
         provenance=dict(provenance),
     )  # fmt: skip

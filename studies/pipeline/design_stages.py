@@ -137,7 +137,7 @@ class Choose(DesignStage):
     def work(self, tools: Tools) -> str:
         """Write the files."""
         best, devices = ranked([Confirmation.load(path) for path in self.takes[1:]])[0], self.devices()
-        scenes = {WORST: (best.scene, "The largest amplitude"), SPOTS: (best.spot_scene, "The largest stress")}
+        scenes = {WORST: (best.worst_scene, "The largest amplitude"), SPOTS: (best.spot_scene, "The largest stress")}
         for path in self.outputs:
             if path.name in scenes:
                 scene, what = scenes[path.name]

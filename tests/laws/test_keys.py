@@ -18,7 +18,8 @@ from vanedamp.studies.file_kinds import KINDS
 PROBES = [0, "spam", "", True, -1e300, -1.5, -1, 0.5, 1.5, 10**12, 1e300, [], [-1.0], ["spam"], [[]], {}, {"spam": 1}]
 #: keys, of which a record requires one
 COMPLETED = {
-    "CoordinateTable": {"coordinate": 0}, "Envelope": {"friction": [0, 1], "restitution": [0, 1]}, "Excitation": {"frequency": 1.0}, "Life": {"band": [1.0]},
+    "CoordinateTable": {"coordinate": 0}, "Envelope": {"friction": [0, 1], "restitution": [0, 1]},
+    "Excitation": {"frequency": 1.0}, "Life": {"band": [1.0]},
     "MatricesTable": {"damping_ratio": 0.01}, "Optimise": {"band": [1.0]}, "Ramp": {"to": 2.0, "rate": 1.0},
     "Sought": {"min": 0.0},
 }  # fmt: skip
