@@ -93,6 +93,7 @@ from vanedamp.studies.identification.density import LogDensity as LogDensity
 # Design: optimisation within tolerances, wear and life
 from vanedamp.studies.pipeline.design import design as design
 from vanedamp.studies.design.record import DesignRecord as DesignRecord
+from vanedamp.studies.design.worst import Confirmation as Confirmation
 from vanedamp.studies.optimisation.search import optimise as optimise
 from vanedamp.studies.optimisation.study import Study as Study
 from vanedamp.studies.life.life import life as life

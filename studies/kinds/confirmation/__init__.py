@@ -9,7 +9,7 @@ from vanedamp.studies.facts import Fact, Found
 NAME = "confirmation"
 ABOUT = "a device over all that is uncertain of it"
 COMMANDS = ("design",)
-RECORD = "vanedamp.studies.design.worst.Confirmation"
+RECORD = "vanedamp.Confirmation"
 
 
 def facts(record: Found) -> Iterator[Fact]:
