@@ -151,10 +151,10 @@ class Devices:
         count = int(np.clip(math.ceil(_PER_WIDTH * (high - low) / width), _FEWEST, _MOST))
         return np.linspace(low, high, count)
 
-    def tables(self, device: Device, level: int | None) -> dict[str, Any]:
+    def tables(self, device: Device, level: int | None, stress: bool = False) -> dict[str, Any]:
         """Return the tables of a scene with a device, in the middle of what is uncertain.
 
-        level: number of natural modes; None: the whole reduced model.
+        level: number of natural modes; None: the whole reduced model; stress: with hot spots, which take longer.
         """
         envelope, middle = self.study.envelope, {name: sum(span) / 2 for name, span in self.uncertain.items()}
         body: dict[str, Any] = {"mass": device.mass} | {name: middle[name] for name in ("friction", "restitution")}
@@ -166,7 +166,8 @@ class Devices:
             cavity["play"] = envelope.play or device.gap
         names = [entry["name"] for entry in self.cavities]
         order = sorted(index % len(names) for index in range(device.bodies))
-        modes = {} if level is None else {"modes": level, "natural": True, "file": str(self.rom.with_name(PLAIN))}
+        modes: dict[str, Any] = {} if level is None else {"modes": level, "natural": True}
+        modes["file"] = str(self.rom if stress else self.rom.with_name(PLAIN))
         return {
             **self._data,
             "structure": self._data["structure"] | modes,
@@ -176,9 +177,9 @@ class Devices:
             "time": dict(self._time),
         }
 
-    def at(self, device: Device, level: int | None) -> Scene:
+    def at(self, device: Device, level: int | None, stress: bool = False) -> Scene:
         """Return such a scene. Raises InputError, naming the study, for a device that does not fit the model."""
-        return Scene.of(self.tables(device, level), self.source)
+        return Scene.of(self.tables(device, level, stress), self.source)
 
     @property
     def uncertain(self) -> dict[str, tuple[float, float]]:
@@ -220,7 +221,8 @@ class Devices:
 
     def life(self, device: Device, level: int | None, keeps: float) -> dict[str, Any]:
         """Return the tables of the study of a device's life; keeps: reduction that must remain."""
-        return self.tables(device, level) | {
+        stress = self.study.effort.hot_spots > 0  # of the whole model
+        return self.tables(device, None if stress else level, stress) | {
             "life": {
                 "hours": self.study.hours, "band": self.frequencies.tolist(), "dwell": self.dwell.tolist(),
                 "measure": "amplitude_max", "threshold": keeps, "tolerance": 0.05, "reach": 0.3,

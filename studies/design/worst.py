@@ -141,9 +141,11 @@ class _Runs:
         self.curve = np.zeros(len(devices.frequencies))
         self.amplitude, self.at, self.scene = 0.0, dict[str, Any](), dict[str, Any]()
 
-    def over_band(self, level: int | None, numbers: Mapping[str, float], frequencies: np.ndarray) -> Any:
-        """Return the sweep of a draw over frequencies, from rest, going up and down."""
-        scene = self.devices.at(self.device, level).replace(dict(numbers))
+    def over_band(
+        self, level: int | None, numbers: Mapping[str, float], frequencies: np.ndarray, stress: bool = False
+    ) -> Any:
+        """Return the sweep of a draw over frequencies, from rest, going up and down, and its amplitudes, m."""
+        scene = self.devices.at(self.device, level, stress).replace(dict(numbers))
         axes = {"continuation.direction": list(STARTS), "excitation.frequency": frequencies.tolist()}
         found = sweep(scene.replace({"sweep": axes}), self._executor)
         heights = self._heights(found.status.ravel(), found.quantities).reshape(found.shape)
@@ -274,7 +276,7 @@ def _levels(runs: _Runs, numbers: Mapping[str, float]) -> tuple[tuple[dict[str, 
     """Return the amplitude of a draw on each level, and its sweep on the whole reduced model."""
     entries, found = [], None
     for level in (*LEVELS, None):
-        found, heights = runs.over_band(level, numbers, runs.devices.frequencies)
+        found, heights = runs.over_band(level, numbers, runs.devices.frequencies, stress=level is None)
         entries.append({"level": level, "amplitude": float(np.fmax.reduce(heights, axis=None))})
     return tuple(entries), found
 
@@ -305,7 +307,7 @@ def _missed(amplitudes: np.ndarray) -> float:
 
 def _spots(runs: _Runs, numbers: Mapping[str, float], known: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return what hot spots take of a draw on the whole reduced model, and its scene with its sweep."""
-    found = runs.over_band(None, numbers, runs.devices.frequencies)[0] if known is None else known
+    found = runs.over_band(None, numbers, runs.devices.frequencies, stress=True)[0] if known is None else known
     names = list(found.provenance.get("hot_spots", ()))
     if not names:
         return {}, {}

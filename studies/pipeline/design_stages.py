@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,7 +120,7 @@ class Confirm(DesignStage):
 
         devices, pool = self.devices(), tools.pool()
         candidates = tried(Optimisation.load(self.takes[1]))
-        compile_engine([devices.at(candidates[0][0], level) for level in (LEVELS[0], None)], pool)
+        compile_engine([devices.at(candidates[0][0], level, level is None) for level in (LEVELS[0], None)], pool)
         with progress(f"{self.name}, all starts") as report:
             device = screened(devices, candidates, pool, report)
         with progress(self.name) as report:
@@ -141,15 +142,16 @@ class Choose(DesignStage):
         for path in self.outputs:
             if path.name in scenes:
                 scene, what = scenes[path.name]
-                data = short_form(Scene.of(dict(scene), path)) if scene else devices.tables(best.chosen, None)
+                data = (
+                    short_form(Scene.of(dict(scene), path)) if scene else devices.tables(best.chosen, None, stress=True)
+                )
                 note = f"{what} of the device: {words_of(best.chosen)}."
                 write_commented(path, relative(data, path), KINDS["scene"], {"": note})
             else:
                 limits = self.study.requirements
                 ratios = [limits.amplitude_ratio, limits.amplitude and limits.amplitude / devices.amplitude]
                 keeps = 1.0 - min((ratio for ratio in ratios if ratio), default=0.99)
-                level = None if self.study.effort.hot_spots else best.level
-                data = devices.life(best.chosen, level, max(keeps, 0.01))
+                data = devices.life(best.chosen, best.level, max(keeps, 0.01))
                 note = f"Wear of {words_of(best.chosen)}, and the damage of the vane meanwhile."
                 write_commented(path, relative(data, path), KINDS["life"], {"": note})
         return words_of(best.chosen)
@@ -202,12 +204,13 @@ def estimated(devices: Devices) -> float:
     envelope = devices.study.envelope
     for bodies in envelope.bodies:
         device = Device(bodies, sum(envelope.mass) / 2 / bodies, sum(envelope.gap) / 2)
-        costs = {level: mean_cost([devices.at(device, level)]) for level in (LEVELS[0], None)}
+        cheap, stressed = (mean_cost([devices.at(device, level, level is None)]) for level in (LEVELS[0], None))
         searched = effort.evaluations * (2 + effort.samples) + 10
-        total += costs[LEVELS[0]] * (points * (searched + 3 * effort.draws) + effort.starts)
-        total += costs[None] * 3 * points
+        # most often a level between these decides
+        confirmed = math.sqrt(cheap * mean_cost([devices.at(device, None)]))
+        total += points * (cheap * searched + stressed * 3) + confirmed * (points * 3 * effort.draws + effort.starts)
         if devices.study.wear is not None and bodies == envelope.bodies[0]:
-            total += costs[None] * 12 * points
+            total += stressed * 12 * points
     return total / available_cores()
 
 
