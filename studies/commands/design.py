@@ -9,9 +9,7 @@ from functools import partial
 from vanedamp.studies.commands.support.messages import write_result
 from vanedamp.studies.commands.support.outputs import check_outputs, output_folder
 from vanedamp.studies.design.record import DesignRecord
-from vanedamp.studies.pipeline.design import folder_of
 from vanedamp.studies.pipeline.design import run as run_design
-from vanedamp.studies.pipeline.design_stages import DESIGN
 
 
 def run(arguments: Namespace) -> None:
@@ -20,8 +18,6 @@ def run(arguments: Namespace) -> None:
     arguments.output, arguments.inputs = None, [arguments.input]
     check_outputs(arguments)
     note = partial(print, file=sys.stderr if arguments.json == "-" else sys.stdout, flush=True)
-    result = run_design(arguments.input, folder, arguments.workers, arguments.dry_run, note)
-    data = result.to_json()
-    if not arguments.dry_run:
-        data |= DesignRecord.load(folder_of(arguments.input, folder) / DESIGN).to_json()
-    write_result(arguments, data)
+    result, file = run_design(arguments.input, folder, arguments.workers, arguments.dry_run, note)
+    device = {} if arguments.dry_run else DesignRecord.load(file).to_json()
+    write_result(arguments, result.to_json() | device)

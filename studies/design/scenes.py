@@ -52,8 +52,8 @@ class Device(NamedTuple):
 class Devices:
     """The devices of a study on its reduced model.
 
-    scene: any of them, in the middle of what is uncertain, on the cheapest level; frequencies: (f,) Hz of the band;
-    amplitude: m, of the resonance without bodies; mass: kg, modal.
+    frequency: Hz, of the resonance without bodies; amplitude: m, there; mass: kg, modal; frequencies: (f,) Hz of the
+    band; cavities: tables of those that may hold bodies, without gaps.
     """
 
     def __init__(self, study: DesignFile, rom: Path, source: str) -> None:
@@ -91,8 +91,7 @@ class Devices:
         for level in (LEVELS[0], None):
             self._check(middle, level)
         self._check_requirements()
-        self.scene = self.at(middle, LEVELS[0])
-        self.amplitude = float(linear_peaks(self.scene, *map(float, self.frequencies[[0, -1]]))[0].amplitude)
+        self.amplitude = float(linear_peaks(scene, *map(float, self.frequencies[[0, -1]]))[0].amplitude)
 
     def _check(self, device: Device, level: int | None) -> None:
         """Raise InputError, naming the study, for a device that its model or its cavities do not take."""

@@ -284,8 +284,8 @@ def _levels(runs: _Runs, numbers: Mapping[str, float]) -> tuple[tuple[dict[str, 
 def _level(levels: Sequence[Mapping[str, Any]], tolerance: float) -> int | None:
     """Return the cheapest level whose amplitude is within a tolerance of the last one's."""
     last = levels[-1]["amplitude"]
-    level: int | None = next(one["level"] for one in levels if abs(one["amplitude"] - last) <= tolerance * last)
-    return level
+    near = (one["level"] for one in levels if abs(one["amplitude"] - last) <= tolerance * last)
+    return next(near, None)
 
 
 def _refine(runs: _Runs, level: int | None, band: np.ndarray) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from vanedamp.files.toml_input import InputError
 from vanedamp.studies.design.record import DesignRecord
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.pipeline.design_stages import DESIGN, design_stages
@@ -23,23 +22,18 @@ def design(
     Arguments as of `pipeline`: a killed study resumes. The folder of the results has the page, design.html, the reduced
     model, searches, confirmations, and the scenes of the results. Raises InputError.
     """
-    run(path, folder, workers, False, note)
-    return DesignRecord.load(folder_of(path, folder) / DESIGN)
+    _, result = run(path, folder, workers, False, note)
+    return DesignRecord.load(result)
 
 
 def run(
     path: str | Path, folder: str | Path | None, workers: int | None, dry_run: bool, note: Callable[[str], None] | None
-) -> PipelineResult:
-    """Run the stages of a study file, or name those that would run. Raises InputError."""
-    study, target = DesignFile.load(path), folder_of(path, folder)
-    return run_stages(
-        list(design_stages(study, Path(path), target)), Path(path), [study.case], target, workers, dry_run, note
-    )
+) -> tuple[PipelineResult, Path]:
+    """Run the stages of a study file, or name those that would run; return them and the file of the device.
 
-
-def folder_of(path: str | Path, folder: str | Path | None) -> Path:
-    """Return the folder of the results of a study file. Raises InputError for a file of that name."""
-    target = Path(folder) if folder is not None else Path(path).parent / DesignFile.load(path).folder
-    if target.exists() and not target.is_dir():
-        raise InputError(f"{path}: folder: {target} is a file; name a folder for the results")
-    return target
+    Raises InputError.
+    """
+    study, source = DesignFile.load(path), Path(path)
+    target = Path(folder) if folder is not None else source.parent / study.folder
+    listed = list(design_stages(study, source, target))
+    return run_stages(listed, source, [study.case], target, workers, dry_run, note), target / DESIGN

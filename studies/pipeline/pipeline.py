@@ -75,8 +75,6 @@ def pipeline(
     """
     table, source = PipelineFile.load(path), Path(path)
     target = Path(folder) if folder is not None else source.parent / table.folder
-    if target.exists() and not target.is_dir():
-        raise InputError(f"{path}: folder: {target} is a file; name a folder for the results")
     listed = list(stages(table, source, target))
     return run_stages(listed, source, [*table.named_files.values()], target, workers, dry_run, note)
 
@@ -87,6 +85,8 @@ def run_stages(
 ) -> PipelineResult:  # fmt: skip
     """Run the stages of a file whose inputs have changed, as `pipeline` says; files: those that it names."""
     started, say = time.perf_counter(), note or (lambda line: None)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{source}: folder: {folder} is a file; name a folder for the results")
     _check(listed, [source, *files], source, workers or available_cores())
     record = PipelineRecord(folder / f"{source.stem}.record.json")
     _keep_edited(listed, record)

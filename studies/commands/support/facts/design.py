@@ -16,7 +16,7 @@ def facts(path: str | Path) -> list[Fact]:
     case = Path(path).parent / study.case
     envelope, must = study.envelope, study.requirements
     limits = {name: getattr(must, name) for name in ("amplitude_ratio", "amplitude", "utilisation")}
-    plan = run(path, None, None, True, None).stages
+    plan = run(path, None, None, True, None)[0].stages
     return [
         Fact("commands", ["design"]),
         Fact("files", [str(case), *map(str, Case.load(case).files)]),
