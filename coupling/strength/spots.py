@@ -59,6 +59,11 @@ class Spots:
         """Fatigue data of the spots (s); None for one without a fatigue strength."""
         return [fatigue_of(facts) for facts in self.facts.values()]
 
+    @property
+    def have_lives(self) -> bool:
+        """Whether every spot has a curve of stress and life."""
+        return all(one is not None and one.exponent is not None for one in self.materials)
+
     def stress(self, coordinates: np.ndarray) -> np.ndarray:
         """Return stresses (s, 6, ...), Pa, of modal coordinates (..., n)."""
         return np.moveaxis(coordinates @ self.rows.reshape(-1, len(self.squares)).T, -1, 0).reshape(

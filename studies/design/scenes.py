@@ -10,13 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.coupling.strength.assessment import fatigue_of
+from vanedamp.coupling.strength.spots import Spots, spots_of
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.linear_response import linear_peaks
 from vanedamp.coupling.system.resonance import chosen_resonance
 from vanedamp.coupling.system.transient import settled_after
 from vanedamp.files.toml_input import InputError, plain, tables
-from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.model_scene import contact_stiffness, on_model
@@ -90,7 +89,7 @@ class Devices:
         self._time = {"periods": dropped + _EVALUATED, "transient": dropped}
         for level in (LEVELS[0], None):
             self._check(middle, level)
-        self._check_requirements()
+        self._check_requirements(spots_of(self.at(middle, None, stress=True)))
         self.amplitude = float(linear_peaks(scene, *map(float, self.frequencies[[0, -1]]))[0].amplitude)
 
     def _check(self, device: Device, level: int | None) -> None:
@@ -100,16 +99,15 @@ class Devices:
         except InputError as error:
             raise InputError(f"{self.source}: envelope: {error}") from None
 
-    def _check_requirements(self) -> None:
+    def _check_requirements(self, spots: Spots | None) -> None:
         """Raise InputError for requirements of results that are not computed."""
-        must, spots = self.study.requirements, hot_spots(self._model)
-        materials = [fatigue_of(facts) for facts in spots.values()]
-        if must.utilisation is not None and (not materials or None in materials):
+        must = self.study.requirements
+        if must.utilisation is not None and (spots is None or None in spots.materials):
             raise InputError(
                 f"{self.source}: requirements.utilisation: no stress over a strength is computed; give "
                 "effort.hot_spots, and the case a material.fatigue_strength"
             )
-        lives = bool(materials) and all(one is not None and one.exponent is not None for one in materials)
+        lives = spots is not None and spots.have_lives
         if must.hours is not None and not lives and self.study.wear is None:
             raise InputError(
                 f"{self.source}: requirements.hours: no life is computed; give [wear], or effort.hot_spots and the "

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from vanedamp.coupling.quantities.amplitude import amplitude_max_dynamic
 from vanedamp.coupling.quantities.stress import damage_per_hour, utilisation, von_mises
+from vanedamp.files.store import finite
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.design.worst import Confirmation
 from vanedamp.studies.hot_spots import DOUBTFUL
@@ -110,7 +111,7 @@ def _amplitudes(study: DesignFile, worst: Confirmation) -> Iterator[HeldValue]:
         ("largest amplitude over that without bodies", "1", worst.reference, requirements.amplitude_ratio),
     ):
         value, source = worst.amplitude / over, f"{WORST}: {amplitude_max_dynamic.name}"
-        yield HeldValue(name, unit, value, value, _finite(upper / over), due, source, limit, doubtful=worst.failed > 0)
+        yield HeldValue(name, unit, value, value, finite(upper / over), due, source, limit, doubtful=worst.failed > 0)
 
 
 def _stresses(study: DesignFile, worst: Confirmation, spots: Mapping[str, SpotFacts]) -> Iterator[HeldValue]:
@@ -125,7 +126,7 @@ def _stresses(study: DesignFile, worst: Confirmation, spots: Mapping[str, SpotFa
                 high = value * (1.0 + error) * (1.0 + _rise(worst))
                 unit = "Pa" if quantity == von_mises.name else "1"
                 yield HeldValue(
-                    f"{name} at {spot}", unit, value, max(value * (1.0 - error), 0.0), _finite(high),
+                    f"{name} at {spot}", unit, value, max(value * (1.0 - error), 0.0), finite(high),
                     f"mesh {_percent(spots[spot].error)}, draws, starts and modes {_percent(_rise(worst))}",
                     f"{SPOTS}: {quantity}", limit, doubtful=spots[spot].doubtful and limit is not None,
                 )  # fmt: skip
@@ -158,10 +159,6 @@ def _lives(
             "life of the damper", "h", end if lost is None else lost, end if early is None else early, late,
             "confidence of the runs, steps of the wear", f"{LIFE}: hours", study.hours, least=True,
         )  # fmt: skip
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _percent(fraction: float | None) -> str:

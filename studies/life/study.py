@@ -229,8 +229,7 @@ class WearEffect(NamedTuple):
 def _damaged(scene: Scene) -> tuple[str, ...]:
     """Return the hot spots of a scene's model; none where one of them has no curve of stress and life."""
     spots = spots_of(scene)
-    known = spots is not None and all(one is not None and one.exponent is not None for one in spots.materials)
-    return tuple(spots.facts) if spots is not None and known else ()
+    return tuple(spots.facts) if spots is not None and spots.have_lives else ()
 
 
 def _check(scene: Scene) -> None:

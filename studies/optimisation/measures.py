@@ -76,7 +76,7 @@ def check_measured(scene: Scene, measure: str, limits: Limits) -> None:
         materials = [] if spots is None else spots.materials
         if name == "utilisation" and None in materials:
             raise InputError(f"optimise.{key}: a hot spot has no fatigue strength; give [material.fatigue] in the case")
-        if name == "life" and any(one is None or one.exponent is None for one in materials):
+        if name == "life" and spots is not None and not spots.have_lives:
             raise InputError(
                 f"optimise.{key}: a hot spot has no curve of stress and life; give [material.fatigue] exponent and knee"
             )

@@ -7,8 +7,10 @@ import importlib
 import itertools
 import os
 import stat
+import sys
 from argparse import Namespace
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -85,6 +87,17 @@ def output_folder(arguments: Namespace) -> Path:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--output {folder}: expected a folder, not a file")
     return folder
+
+
+def of_stages(arguments: Namespace, source: str) -> tuple[Path | None, Callable[[str], None]]:
+    """Return the folder of a command that runs stages, None: the input's own, and what prints their lines.
+
+    source: the input file. Raises InputError for outputs that cannot be written.
+    """
+    folder = None if arguments.output is None else output_folder(arguments)
+    arguments.output, arguments.inputs = None, [source]
+    check_outputs(arguments)
+    return folder, partial(print, file=sys.stderr if arguments.json == "-" else sys.stdout, flush=True)
 
 
 def _checkpoint_file(output: str | None) -> Path | None:
