@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from vanedamp.files.record import Array, Record
-from vanedamp.studies.design.scenes import UNCERTAIN, Device
+from vanedamp.studies.design.scenes import UNCERTAIN, Device, words_of
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.design.verdict import AMBER, GREEN, RED, HeldValue
 
@@ -83,13 +83,6 @@ class DesignRecord(Record):
         """Its results."""
         names = HeldValue.__dataclass_fields__
         return [HeldValue(**{key: value[key] for key in names}) for value in self.values]
-
-
-def words_of(device: Device) -> str:
-    """Return a device in words."""
-    count = "1 body" if device.bodies == 1 else f"{device.bodies} bodies"
-    each = "" if device.bodies == 1 else " each"
-    return f"{count} of {1e3 * device.mass:.4g} g{each} with a gap of {1e6 * device.gap:.3g} um"
 
 
 def sentence_of(device: Device, grade: str, ratio: float, at: Mapping[str, Any], failing: Sequence[HeldValue]) -> str:

@@ -48,6 +48,13 @@ class Device(NamedTuple):
     gap: float
 
 
+def words_of(device: Device) -> str:
+    """Return a device in words."""
+    count = "1 body" if device.bodies == 1 else f"{device.bodies} bodies"
+    each = "" if device.bodies == 1 else " each"
+    return f"{count} of {1e3 * device.mass:.4g} g{each} with a gap of {1e6 * device.gap:.3g} um"
+
+
 class Devices:
     """The devices of a study on its reduced model.
 

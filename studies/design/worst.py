@@ -6,6 +6,7 @@ frequencies. What draws have missed is estimated by the spacing of the largest a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -16,11 +17,13 @@ from scipy.stats import qmc
 
 from vanedamp.coupling.quantities.amplitude import amplitude_max_dynamic, amplitude_mean
 from vanedamp.coupling.quantities.stress import damage_per_hour, utilisation, von_mises
+from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.designs import UNSURE
 from vanedamp.coupling.sweep.sweep import run_list, sweep
 from vanedamp.coupling.system.linear_response import linear_amplitudes
 from vanedamp.files.record import Array, Record
-from vanedamp.studies.design.scenes import LEVELS, Device, Devices
+from vanedamp.files.toml_input import InputError
+from vanedamp.studies.design.scenes import LEVELS, Device, Devices, words_of
 from vanedamp.studies.worst_start import STARTS
 
 #: largest amplitudes of random runs whose spacing counts, and spacings that a further run may exceed the largest by:
@@ -62,7 +65,7 @@ class Confirmation(Record):
     draws: _Draws
     """of these numbers, in their units"""
     of_draws: Annotated[np.ndarray, Array(("draw",), "m")]
-    """largest amplitude of each draw"""
+    """largest amplitude of each draw; nan where all of its runs failed"""
     of_starts: Annotated[np.ndarray, Array(("start",), "m")]
     """amplitudes of the runs with random starts; nan where a run failed"""
     amplitude: float
@@ -104,17 +107,22 @@ class Confirmation(Record):
 
     @property
     def expected(self) -> float:
-        """Largest amplitude that is to be expected, m: with what runs have missed, and the difference of the levels."""
-        return self.amplitude + self.missed + abs(self.level_difference)
+        """Largest amplitude that is to be expected, m: with what runs have missed, and the difference of the levels.
+
+        Infinite where one of these is not known.
+        """
+        total = self.amplitude + self.missed + abs(self.level_difference)
+        return total if math.isfinite(total) else math.inf
 
     def by_number(self) -> list[tuple[str, float]]:
         """Return by path what a number's range adds to the largest amplitude, m, largest first.
 
         By least squares over the draws: the change of a draw's largest amplitude over the range of the number.
         """
-        spread = np.ptp(self.draws, axis=0)
-        scaled = np.column_stack([np.ones(len(self.draws)), (self.draws - self.draws.mean(axis=0)) / spread])
-        slopes = np.linalg.lstsq(scaled, self.of_draws, rcond=None)[0][1:]
+        known = np.isfinite(self.of_draws)
+        draws, spread = self.draws[known], np.ptp(self.draws, axis=0)
+        scaled = np.column_stack([np.ones(len(draws)), (draws - draws.mean(axis=0)) / spread])
+        slopes = np.linalg.lstsq(scaled, self.of_draws[known], rcond=None)[0][1:]
         return sorted(zip(self.numbers, np.abs(slopes).tolist(), strict=True), key=lambda item: -item[1])
 
 
@@ -152,20 +160,17 @@ class _Runs:
         return found, heights
 
     def draw(self, level: int | None, numbers: Mapping[str, float], frequencies: np.ndarray) -> float:
-        """Run a draw over frequencies and keep its largest amplitude, which is returned, m."""
+        """Run a draw over frequencies and keep its largest amplitude; return it, m, nan where all runs have failed."""
         found, heights = self.over_band(level, numbers, frequencies)
         if np.array_equal(frequencies, self.devices.frequencies):
             self.curve = np.fmax(self.curve, np.fmax.reduce(heights, axis=0))
-        largest = float(np.fmax.reduce(heights, axis=None))
-        if largest > self.amplitude:
-            start, index = np.unravel_index(np.nanargmax(heights), heights.shape)
-            direction = list(STARTS)[int(start)]
-            scene = found.scene
-            if direction == "independent":
-                scene = scene.replace({"sweep": {}, "excitation.frequency": float(frequencies[index])})
-            at = {"frequency": float(frequencies[index]), "start": STARTS[direction], **numbers}
-            self.amplitude, self.at, self.scene = largest, at, scene.to_dict()
-        return largest
+        if not np.isfinite(heights).any():
+            return np.nan
+        start, index = np.unravel_index(np.nanargmax(heights), heights.shape)
+        direction, at, scene = list(STARTS)[int(start)], float(frequencies[index]), found.scene
+        if direction == "independent":
+            scene = scene.replace({"sweep": {}, "excitation.frequency": at})
+        return self._keep(float(heights[start, index]), at, STARTS[direction], numbers, scene)
 
     def random_starts(self, level: int | None, count: int, seed: int) -> np.ndarray:
         """Run random draws with bodies that begin anywhere, at up to twice the speed of the resonance without bodies.
@@ -192,14 +197,20 @@ class _Runs:
         ]  # fmt: skip
         table = run_list(base, points, self._executor)
         heights = self._heights(table.text("status"), table.arrays((count,)))
-        largest = float(np.fmax.reduce(heights)) if np.isfinite(heights).any() else 0.0
-        if largest > self.amplitude:
+        if np.isfinite(heights).any():
             index = int(np.nanargmax(heights))
-            scene = base.replace(points[index]).to_dict()
-            own = {path: value for path, value in points[index].items() if path in self.ranges}
-            self.amplitude, self.scene = largest, scene
-            self.at = {"frequency": float(at[index]), "start": "from a random start", **own}
+            values = {path: points[index][path] for path in self.ranges}
+            self._keep(heights[index], at[index], "from a random start", values, base.replace(points[index]))
         return heights
+
+    def _keep(
+        self, amplitude: float, frequency: float, start: str, numbers: Mapping[str, float], scene: Scene
+    ) -> float:
+        """Keep a run if its amplitude, m, is the largest so far; return that amplitude."""
+        if amplitude > self.amplitude:
+            self.amplitude, self.scene = float(amplitude), scene.to_dict()
+            self.at = {"frequency": float(frequency), "start": start, **numbers}
+        return amplitude
 
     def _heights(self, status: np.ndarray, found: Mapping[str, np.ndarray]) -> np.ndarray:
         """Count runs; return their largest amplitudes, m, nan where a run has failed."""
@@ -225,7 +236,7 @@ def confirm(
     draws = drawn(runs.ranges, effort.draws, effort.seed) if paths else np.empty((1, 0))
     rows = [dict(zip(paths, row, strict=True)) for row in draws.tolist()]
     cheap = [runs.draw(LEVELS[0], row, band) for row in rows[: max(len(rows) // 4, 1)]]
-    worst_row = rows[int(np.argmax(cheap))]
+    worst_row = rows[int(np.argmax(np.nan_to_num(cheap)))]
     levels, whole = _levels(runs, worst_row)
     level = _level(levels, effort.tolerance)
     first = cheap if level == LEVELS[0] else []
@@ -233,6 +244,11 @@ def confirm(
         runs.amplitude, runs.curve = 0.0, np.zeros(len(band))
     of_draws = np.array(first + [runs.draw(level, row, band) for row in rows[len(first) :]])
     of_starts = runs.random_starts(level, effort.starts, effort.seed)
+    if not runs.amplitude:
+        raise InputError(
+            f"{devices.source}: envelope: none of {runs.done} runs of {words_of(device)} has a result; see the status "
+            f"of `vanedamp run` of its scene at {band[0]:.6g} Hz"
+        )
     _refine(runs, level, band)
     linear = linear_amplitudes(devices.at(device, level), band)
     numbers = {path: runs.at[path] for path in paths}
@@ -263,8 +279,10 @@ def screened(
         runs = _Runs(devices, device, executor, lambda more, before=done: progress(before + more, total))  # type: ignore[misc]
         largest = known
         for row in drawn(runs.ranges, _SCREENED, devices.study.effort.seed).tolist() if runs.ranges else [[]]:
-            largest = max(largest, runs.draw(LEVELS[0], dict(zip(runs.ranges, row, strict=True)), devices.frequencies))
-            if largest >= least:
+            largest = np.maximum(
+                largest, runs.draw(LEVELS[0], dict(zip(runs.ranges, row, strict=True)), devices.frequencies)
+            )
+            if not largest < least:  # nor where it is not known
                 break
         done += runs.done
         if largest < least:

@@ -19,8 +19,8 @@ from vanedamp.files.toml_output import write_commented
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.case.tables import Case
-from vanedamp.studies.design.record import DesignRecord, measurement, sentence_of, words_of
-from vanedamp.studies.design.scenes import LEVELS, PLAIN, Device, Devices, plain_model
+from vanedamp.studies.design.record import DesignRecord, measurement, sentence_of
+from vanedamp.studies.design.scenes import LEVELS, PLAIN, Device, Devices, plain_model, words_of
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.design.verdict import GREEN, LIFE, SPOTS, WORST, SpotFacts, held, overall
 from vanedamp.studies.design.worst import Confirmation, confirm, screened
@@ -257,9 +257,11 @@ def spot_facts(rom: Path) -> dict[str, SpotFacts]:
 
 def _lost(best: Confirmation, other: Confirmation) -> dict[str, Any]:
     """Return another device, and why it lost."""
-    difference = other.expected / best.expected - 1.0
+    difference = other.expected / best.expected - 1.0 if math.isfinite(other.expected) else math.inf
     why = f"largest amplitude to be expected {difference:+.0%}"
-    if abs(difference) <= _SAME:
+    if math.isinf(difference):
+        why = "largest amplitude to be expected is not known"
+    elif abs(difference) <= _SAME:
         why = f"as good within {_SAME:.0%}, with more bodies"
     if other.failed:
         why += f"; {other.failed} runs without a result"

@@ -6,7 +6,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from vanedamp.studies.design.record import words_of
+from vanedamp.studies.design.scenes import words_of
 from vanedamp.studies.design.worst import Confirmation
 from vanedamp.studies.report.charts import COLOURS
 from vanedamp.studies.report.page import Page

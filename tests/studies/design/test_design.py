@@ -17,7 +17,7 @@ from vanedamp.studies.design.record import DesignRecord
 from vanedamp.studies.design.scenes import Device, Devices
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.design.verdict import AMBER, GREEN, RED, HeldValue
-from vanedamp.studies.design.worst import Confirmation, _missed, drawn
+from vanedamp.studies.design.worst import Confirmation, _missed, _Runs, confirm, drawn
 
 CASE = """
 [mesh]
@@ -274,6 +274,14 @@ def test_levels_and_cavities(finished):
     assert one.structure.modes == 1
     with pytest.raises(InputError, match=r"envelope\.cavities: no cavity 'c9'; the case has c1"):
         Devices(replace(study, envelope=replace(study.envelope, cavities=("c9",))), rom, "design.toml")
+
+
+def test_a_device_whose_runs_all_fail_is_named(finished, monkeypatch):
+    folder, record = finished
+    devices = Devices(DesignFile.load(folder / "design.toml"), (folder / "out/rom.h5").resolve(), "design.toml")
+    monkeypatch.setattr(_Runs, "_heights", lambda self, status, found: np.full(status.size, np.nan))
+    with pytest.raises(InputError, match=r"design\.toml: envelope: none of .* runs of .* has a result"):
+        confirm(devices, record.chosen, None, lambda done, total: None, {})
 
 
 @pytest.mark.parametrize(
