@@ -108,8 +108,9 @@ def _checked(system: System, state: RestartState) -> RestartState:
     """Return a state in which nothing overlaps a surface or a stop. Raises InputError for others."""
     u = system.contacts
     gaps = system.rest[:u] + system.J[:u] @ motion_of(system, state).q
-    for unit in np.flatnonzero(gaps < -_ROUND_OFF * system.play[:u]):
-        body, side, over = system.body[unit], SURFACES[system.surface[unit]], f"{-gaps[unit]:.3g}"
+    over_rest = gaps - np.minimum(system.rest[:u], 0.0)  # springs that are closed at rest
+    for unit in np.flatnonzero(over_rest < -_ROUND_OFF * system.play[:u]):
+        body, side, over = system.body[unit], SURFACES[system.surface[unit]], f"{-over_rest[unit]:.3g}"
         if system.without_body[unit]:
             raise InputError(f"initial.displacement: the structure would begin {over} m beyond {side}[{body}]")
         raise InputError(f"damper[{body}]: begins {over} m beyond the cavity's {side}; change position, lift or tilt")

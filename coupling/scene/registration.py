@@ -43,7 +43,7 @@ for _law in (Newton, Poisson, Compliant, Massless, Viscoelastic, Hertz):
 for _waveform in (Multisine, History):
     WAVEFORMS.register(_waveform)
 
-_SHAPES = "vanedamp.coupling.scene.shapes"
+_SHAPES, _ELEMENTS = "vanedamp.coupling.scene.shapes", "vanedamp.coupling.scene.elements"
 #: the values of `damper.shape`
 SHAPES = Registry(
     "shape",
@@ -58,7 +58,10 @@ SHAPES = Registry(
 )
 #: the tables of elements
 ELEMENTS = Registry(
-    "element", {"stop": "vanedamp.coupling.scene.elements.stop:Stop"}, "vanedamp.elements", ("units", "on_structure")
+    "element",
+    {"stop": f"{_ELEMENTS}.stop:Stop", "joint": f"{_ELEMENTS}.joint:Joint"},
+    "vanedamp.elements",
+    ("units", "on_structure"),
 )
 
 

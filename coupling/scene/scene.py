@@ -275,15 +275,20 @@ class Scene(OpenRecord, Displayed):
     @property
     def elements(self) -> Iterator[tuple[str, int, SceneElement]]:
         """Table, number in it, and record of every element: stops, and those that other code adds."""
-        tables = {"stop": self.stop} | (self.added or {})
-        return ((table, number, entry) for table, entries in tables.items() for number, entry in enumerate(entries))
+        tables = self.element_tables.items()
+        return ((table, number, entry) for table, entries in tables for number, entry in enumerate(entries))
+
+    @property
+    def element_tables(self) -> dict[str, tuple[SceneElement, ...]]:
+        """The lists of tables of elements by their names."""
+        return {"stop": self.stop} | (self.added or {})
 
     @property
     def repeats(self) -> bool:
         """Whether labels and tables are still to be repeated over the sectors of a ring (system.sectors.unrolled)."""
         if not isinstance(self.structure, Ring):
             return False
-        tables: tuple[Any, ...] = (*self.cavity, *self.friction_damper, *self.stop)
+        tables: tuple[Any, ...] = (*self.cavity, *self.friction_damper, *(one for _, _, one in self.elements))
         return (
             "@" not in str(self.excitation.at)
             or self.excitation.travelling is not None
@@ -452,8 +457,9 @@ class Scene(OpenRecord, Displayed):
     def _check_ring(self) -> None:
         """Raise ValueError for something of a ring on another structure, and for a wave that is not of sines."""
         excitation, ring = self.excitation, isinstance(self.structure, Ring)
-        for table in ("cavity", "friction_damper", "stop"):
-            for number, entry in enumerate(getattr(self, table)):
+        tables = {"cavity": self.cavity, "friction_damper": self.friction_damper} | self.element_tables
+        for table, entries in tables.items():
+            for number, entry in enumerate(entries):
                 if entry.sectors is not None and not ring:
                     raise ValueError(
                         f'{table}[{number}].sectors: this structure is no ring; take structure.model = "ring", or '
@@ -467,7 +473,7 @@ class Scene(OpenRecord, Displayed):
 
     def _check_wear_pairs(self) -> None:
         """Raise ValueError for contacts with rates of their own that the scene has not."""
-        counts = {"casing": len(self.friction_damper), "stop": len(self.stop)}
+        counts = {"casing": len(self.friction_damper)} | {name: len(of) for name, of in self.element_tables.items()}
         for number, pair in enumerate(() if self.wear is None else self.wear.pair):
             owners = {"casing": "friction dampers", "stop": "stops"}.get(pair.side or "", "bodies")
             count = counts.get(pair.side or "", len(self.damper))

@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 from vanedamp.files.toml_input import STRICT, Fraction, NonNegative, Positive, Real, Whole
 
 #: names of what wears: surfaces of cavities, the face to the next body, friction dampers and stops
-Side = Literal["left", "right", "floor", "ceiling", "body", "casing", "stop"]
+Side = Literal["left", "right", "floor", "ceiling", "body", "casing", "stop", "joint"]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -54,10 +54,10 @@ class WearPair(WearRates):
     """Contacts with rates of their own: those of a body, of a surface, or of both. Later tables come first."""
 
     damper: Annotated[Whole, Field(ge=0)] | None = None
-    """number of the body, from 0; of a stop or friction damper its own number (default: all)"""
+    """number of the body, from 0; of a stop, joint or friction damper its own number (default: all)"""
     side: Side | None = None
-    """surface: "left", "right", "floor", "ceiling", "body" (the next body to the right), "casing" (friction damper) or
-    "stop" (default: all)"""
+    """surface: "left", "right", "floor", "ceiling", "body" (the next body to the right), "casing" (friction damper),
+    "stop" or "joint" (default: all)"""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -71,6 +71,9 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     mass, holds = _mass(bodies, size), _holding(scene, loads)
     law = Law(scene.contact, basis, mass)
     contacts, elements = _contacts(scene, law, bodies, surfaces, placed, excited["load"][:, :n])
+    for unit in contacts:
+        if values(unit.closing):
+            excited["weight"] = excited["weight"] - unit.closing * unit.normal
     rubbing = friction_elements(scene, bodies, placed["floor"], holds, casing["casing"], casing["grip"])
     units = _columns([*contacts, *elements, *rubbing], size)
     sliders = len(casing["tangential"])
@@ -196,7 +199,7 @@ def _contacts(
     squares, begun = law.basis.stiffness, scene.initial
     start = abs(begun.displacement) + (abs(begun.velocity) / np.sqrt(squares[0]) if len(squares) else 0.0)
     reach = np.abs(values(force)).sum(axis=0) / values(squares)
-    parts = ElementParts(law, forced_label(scene), reach, start, placed["floor"], placed["along"])
+    parts = ElementParts(law, forced_label(scene), reach, start, placed["floor"], placed["along"], scene.speed)
     elements = list(element_units(scene, parts))
     contacts += [unit for unit in elements if unit.normal.any()]
     if active() is None:

@@ -7,13 +7,13 @@ made and where its system is assembled. Cavity "c" becomes "c@0", "c@1", ..., it
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from vanedamp.coupling.scene.bodies import Cavity, Damper
+from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper
 from vanedamp.coupling.scene.excitation import Excitation, Harmonic
 from vanedamp.coupling.scene.load_pattern import Load
 from vanedamp.coupling.scene.repetition import Sectors
@@ -38,24 +38,31 @@ def unrolled(scene: Scene) -> Scene:
     ring = ring_in_file(scene.structure)
     assert ring is not None
     _check_diameters(scene, ring)
-    if scene.added and any(cavity.sectors is not None for cavity in scene.cavity):
-        table = next(iter(scene.added))
-        raise InputError(
-            f"{table}: may name bodies by number, which sectors change; write their cavities out by sector"
-        )
+    tables = scene.element_tables
+    for table, entries in tables.items() if any(cavity.sectors is not None for cavity in scene.cavity) else ():
+        if not all(entry.on_structure for entry in entries):
+            raise InputError(
+                f"{table}: may name bodies by number, which sectors change; write their cavities out by sector"
+            )
     shown = str(scene.excitation.at).partition("@")[0]
     cavities, bodies = _cavities(scene, ring)
-    dampers = _repeated(scene.friction_damper, "friction_damper", ("at",), shown, ring)
-    stops = _repeated(scene.stop, "stop", ("at", "to"), shown, ring)
-    copies = {
-        "casing": _places([number for number, _ in dampers]), "stop": _places([number for number, _ in stops]),
-        "": _places([number for number, _ in bodies]),
-    }  # fmt: skip
+
+    def placed(damper: FrictionDamper, label: Callable[[str, str], str]) -> FrictionDamper:
+        return replace(damper, at=label("at", damper.at or shown))
+
+    dampers = _repeated(scene.friction_damper, "friction_damper", ring, placed)
+    elements = {
+        table: _repeated(entries, table, ring, lambda entry, label: entry.relabelled(label))
+        for table, entries in tables.items()
+    }
+    copies = {"casing": _places(dampers), "": _places(bodies)}
+    copies |= {table: _places(entries) for table, entries in elements.items()}
+    written = {table: tuple(entry for _, entry in entries) for table, entries in elements.items()}
     wear = scene.wear and replace(scene.wear, pair=tuple(_pairs(scene.wear.pair, copies)))
     return replace(
         scene, excitation=_excitation(scene.excitation, ring), cavity=cavities,
         damper=tuple(body for _, body in bodies), friction_damper=tuple(damper for _, damper in dampers),
-        stop=tuple(stop for _, stop in stops), wear=wear, ranges={},
+        stop=written.pop("stop"), added=written or None, wear=wear, ranges={},
     )  # fmt: skip
 
 
@@ -177,9 +184,12 @@ class _Draws:
 
 
 def _repeated(
-    entries: Sequence[Any], table: str, keys: Sequence[str], shown: str, ring: RingFacts
+    entries: Sequence[Any], table: str, ring: RingFacts, relabelled: Callable[[Any, Callable[[str, str], str]], Any]
 ) -> list[tuple[int, Any]]:
-    """Return the entries of a table of the structure, over their sectors, each with its number in the scene."""
+    """Return the entries of a table of the structure, over their sectors, each with its number in the scene.
+
+    relabelled: returns an entry with other labels, by key and label.
+    """
     copies = []
     for number, entry in enumerate(entries):
         if entry.sectors is None:
@@ -187,12 +197,11 @@ def _repeated(
             continue
         sectors = sectors_of(entry.sectors, ring.sectors, f"{table}[{number}].sectors")
         for sector in sectors:
-            labels = {
-                key: _label(label, sector, ring, f"{table}[{number}].{key}", len(sectors) > 1)
-                for key in keys
-                if (label := getattr(entry, key) or (shown if key == "at" else None)) is not None
-            }
-            copies.append((number, replace(entry, sectors=None, **labels)))
+
+            def there(key: str, label: str, sector: int = sector, number: int = number, of: list[int] = sectors) -> str:
+                return _label(label, sector, ring, f"{table}[{number}].{key}", len(of) > 1)
+
+            copies.append((number, relabelled(replace(entry, sectors=None), there)))
     return copies
 
 
@@ -213,10 +222,10 @@ def _excitation(excitation: Excitation, ring: RingFacts) -> Excitation:
     return replace(excitation, at=at, wave=None, force=None, harmonic=(), load=loads, load_factor=excitation.force)
 
 
-def _places(numbers: Sequence[int]) -> dict[int, list[int]]:
+def _places(entries: Sequence[tuple[int, Any]]) -> dict[int, list[int]]:
     """Return where each entry of a scene stands once it is repeated, by its number."""
     by_number: dict[int, list[int]] = {}
-    for index, number in enumerate(numbers):
+    for index, (number, _) in enumerate(entries):
         by_number.setdefault(number, []).append(index)
     return by_number
 

@@ -202,7 +202,8 @@ class ElementParts(NamedTuple):
     """Ingredients of the rows of a scene's elements (scene.elements.element.Parts): N coordinates, n of them modes.
 
     law: of contacts; label: of the response; reach: (n,) static displacements of the modes under the excitation; start:
-    displacement of the structure by its initial motion, m; floor (b, N), along (b,): as in System.
+    displacement of the structure by its initial motion, m; floor (b, N), along (b,): as in System; speed: of rotation,
+    rad/s.
     """
 
     law: Law
@@ -211,6 +212,7 @@ class ElementParts(NamedTuple):
     start: float
     floor: np.ndarray
     along: np.ndarray
+    speed: float
 
     def motion(self, label: str | None, key: str) -> np.ndarray:
         """Return the displacement of an interface label. Raises InputError for an unknown one."""
@@ -242,7 +244,7 @@ def element_units(scene: Scene, parts: ElementParts) -> Iterator[Unit]:
             springs = np.isfinite(unit.element.stiffness) and scene.contact.rigid
             if (springs and not element.yields) or ((unit.friction or unit.limit) and not element.rubs):
                 raise TypeError(f"{table}: its units have springs or friction: declare `yields` or `rubs` of its class")
-            play = unit.play or max(values(unit.rest), parts.travel(unit.normal))
+            play = unit.play or max(abs(values(unit.rest)), parts.travel(unit.normal))
             named = unit._replace(side=table, play=play)
             yield from (named,) if element.yields or not unit.normal.any() else layered(scene.contact, named)
 
@@ -253,9 +255,14 @@ def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
         normal = (unit.normal**2 / mass).sum()
         coupled = abs((unit.normal * unit.slip / mass).sum())
         if unit.friction > 0.0 and unit.friction * coupled >= normal:
+            if unit.side in SIDES or unit.other >= 0:
+                raise InputError(
+                    f"damper[{unit.body}].friction: {unit.friction:g} lets the body jam at the {unit.side}; with its "
+                    f"length, height and inertia a corner has a unique motion only below {normal / coupled:.4g}"
+                )
             raise InputError(
-                f"damper[{unit.body}].friction: {unit.friction:g} lets the body jam at the {unit.side}; "
-                f"with its length, height and inertia a corner has a unique motion only below {normal / coupled:.4g}"
+                f"{unit.side}[{unit.body}].friction: {unit.friction:g} lets the structure jam; its motion is unique "
+                f"only below {normal / coupled:.4g}; give normal_stiffness or another contact law"
             )
 
 

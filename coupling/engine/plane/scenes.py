@@ -66,7 +66,7 @@ def _is_outside(system, st, columns, k, linked, left):
     for r in range(system.contacts):
         if linked and (k == 0 or (is_compliant(system, r) and columns.play[k, r] == columns.play[left - 1, r])):
             continue
-        if gap(system, r, st.q) < -SIMULTANEOUS * system.play[r]:  # as response.restart
+        if gap(system, r, st.q) - min(system.rest[r], 0.0) < -SIMULTANEOUS * system.play[r]:  # as response.restart
             return True
     return False
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -16,7 +17,8 @@ class Unit(NamedTuple):
     A contact has a normal row, whose displacement and `rest` are its gap, and may have a slip row with a coefficient of
     friction; a friction element has a slip row and a constant limit. body: number of the body that it moves, or of its
     own entry where it moves none; play: 0 of an element for its gap at rest or how far it moves, the larger; side: name
-    of what it meets, which assembly sets to the name of an element's table.
+    of what it meets, which assembly sets to the name of an element's table; closing: constant load across, N, which its
+    force balances at rest.
     """
 
     normal: np.ndarray
@@ -30,10 +32,15 @@ class Unit(NamedTuple):
     corner: int = -1
     limit: float = 0.0
     other: int = -1
+    closing: float = 0.0
 
 
 class Parts(Protocol):
     """What an element makes its rows (N,) of."""
+
+    @property
+    def speed(self) -> float:
+        """Speed of rotation, rad/s."""
 
     def motion(self, label: str | None, key: str) -> np.ndarray:
         """Return the displacement of an interface label, which the scene names under `key`.
@@ -57,6 +64,8 @@ class SceneElement:
     Its fields are the table's keys, `units` its contacts and friction elements.
     """
 
+    #: sectors of a ring that have one; None: as written. A key of elements that can be repeated
+    sectors: Any = None
     #: whether it acts on the structure only
     on_structure: ClassVar[bool] = False
     #: whether its contacts are springs, not constraints
@@ -67,6 +76,11 @@ class SceneElement:
     def labels(self) -> Mapping[str, str | None]:
         """Return the interface labels that it names, by their keys."""
         return {}
+
+    def relabelled(self, label: Callable[[str, str], str]) -> Self:
+        """Return it with other labels, by key and label."""
+        given = {key: label(key, one) for key, one in self.labels().items() if one is not None}
+        return replace(self, **given)  # type: ignore[type-var]
 
     def check(self, scene: Any) -> None:
         """Raise ValueError, whose message begins with the key, for a scene that it does not fit."""
