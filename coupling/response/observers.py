@@ -90,8 +90,8 @@ def _struck(run: Outcome) -> np.ndarray:
 def _friction(scene: Scene, run: Outcome, row: int) -> float:
     """Return the coefficient of friction of a row of the log; 0: none, and no work of it."""
     number, side, _ = run.rows.places[row]
-    if run.rows.without_body[row]:
-        return scene.friction_damper[number].friction if side == "casing" else 0.0
+    if side == "casing":
+        return scene.friction_damper[number].friction
     if run.system.in_plane and row < run.system.contacts:
         return float(run.system.friction[row])
     return scene.damper[number].friction if side == "floor" else 0.0

@@ -23,7 +23,7 @@ def record_section(system, records, period, q, v, springs, ledger):
             force += system.stiffness[i, k] * q[k]
         energy += 0.5 * q[i] * force
     for i in range(system.modes):
-        energy += 0.5 * system.mass[i] * v[i] * v[i]
+        energy += 0.5 * system.mass[i] * v[i] * v[i] - system.weight[i] * q[i]
     energies[0] = energy
     for b in range(bodies):
         at = system.along[b]

@@ -250,7 +250,8 @@ def spread(given: Sequence[Any], gap: Any) -> list[Any]:
 
 @dataclass(frozen=True, config=STRICT)
 class FrictionDamper:
-    """A Coulomb element between the structure and the casing: the spring-loaded damper that is the usual remedy."""
+    """A Coulomb element of constant normal force between the structure and the casing, or two points of the structure:
+    the spring-loaded damper that is the usual remedy."""
 
     normal_force: Positive
     """normal force in the contact [N]"""
@@ -260,5 +261,12 @@ class FrictionDamper:
     """tangential stiffness in series with the contact, unloaded at time zero (default: rigid Coulomb) [N/m]"""
     at: str | None = None
     """interface label of a reduced model where it acts (default: excitation.at)"""
+    to: str | None = None
+    """interface label of a reduced model that it is held by and moves with (default: the casing); of a ring,
+    "shroud@+1" is in the next sector"""
     sectors: Sectors | None = None
     """sectors of a ring that have one (default: as written)"""
+
+    def __post_init__(self) -> None:
+        if self.to is not None and self.to == self.at:
+            raise ValueError(f"to: '{self.to}' does not rub on itself; name another point, or leave it out")

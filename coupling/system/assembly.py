@@ -105,7 +105,9 @@ def _casing(scene: Scene, basis: ModalBasis, first: int) -> dict[str, Any]:
     """Return the friction dampers. first: number of the first slider's coordinate."""
     dampers, at = scene.friction_damper, forced_label(scene)
     rows = [
-        interface_row(basis, damper.at or at, f"friction_damper[{number}].at") for number, damper in enumerate(dampers)
+        interface_row(basis, damper.at or at, f"friction_damper[{number}].at")
+        - (0.0 if damper.to is None else interface_row(basis, damper.to, f"friction_damper[{number}].to"))
+        for number, damper in enumerate(dampers)
     ]
     grip = array([coefficient(damper.friction) * damper.normal_force for damper in dampers])
     spring = array([np.inf if damper.stiffness is None else damper.stiffness for damper in dampers])

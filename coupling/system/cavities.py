@@ -82,7 +82,8 @@ def _check_displacements(scene: Scene, rotations: frozenset[str]) -> None:
     for table, number, element in scene.elements:
         keys |= {f"{table}[{number}].{key}": label for key, label in element.labels().items()}
     keys |= {name: load.at for name, load in scene.excitation.loads.items()}
-    keys |= {f"friction_damper[{index}].at": damper.at for index, damper in enumerate(scene.friction_damper)}
+    for index, damper in enumerate(scene.friction_damper):
+        keys |= {f"friction_damper[{index}].{key}": getattr(damper, key) for key in ("at", "to")}
     for key, label in keys.items():
         if label in rotations:
             raise InputError(f"{key}: '{label}' is a rotation (rad); name the interface coordinate of a displacement")

@@ -48,7 +48,8 @@ def unrolled(scene: Scene) -> Scene:
     cavities, bodies = _cavities(scene, ring)
 
     def placed(damper: FrictionDamper, label: Callable[[str, str], str]) -> FrictionDamper:
-        return replace(damper, at=label("at", damper.at or shown))
+        to = None if damper.to is None else label("to", damper.to)
+        return replace(damper, at=label("at", damper.at or shown), to=to)
 
     dampers = _repeated(scene.friction_damper, "friction_damper", ring, placed)
     elements = {

@@ -71,7 +71,7 @@ class Followed:
         n, u, massive = system.modes, system.contacts, slice(len(q) - len(system.tangential))
         kinetic = 0.5 * float(v[:n] @ v[:n])
         total = 0.5 * float(system.mass[massive] @ v[massive] ** 2 + q @ system.stiffness @ q)
-        total -= float(system.weight[n:] @ q[n:])
+        total -= float(system.weight @ q)
         state = self._segment.state[:u]
         pressed = np.isfinite(system.spring[:u]) & presses(state)
         gap = (system.rest[:u] + system.J[:u] @ q)[pressed]
