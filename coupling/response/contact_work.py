@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vanedamp.coupling.scene.registration import meets_body
+
 
 class ContactWork(NamedTuple):
     """Work of a contact of a body, or of a friction damper, over the evaluated periods (p of them).
@@ -37,7 +39,7 @@ def contact_name(damper: int, side: str, corner: int = -1) -> str:
     """Return the name of a contact, or of a face without corner, for people."""
     if side == "body":
         return f"bodies {damper} and {damper + 1}"
-    owner = {"casing": "friction damper", "stop": "stop"}.get(side, f"{side} of body")
+    owner = "friction damper" if side == "casing" else f"{side} of body" if meets_body(side) else side
     return f"{owner} {damper}" + (f", corner {corner}" if corner >= 0 else "")
 
 
@@ -46,7 +48,7 @@ class OfContact:
     """A result of one contact; damper, side, corner as of an Event."""
 
     damper: int
-    """number of the body, or of a stop its own"""
+    """number of the body; of a friction damper, a stop or a joint its own"""
     side: str
     """what it meets"""
     corner: int

@@ -457,7 +457,8 @@ class Scene(OpenRecord, Displayed):
     def _check_ring(self) -> None:
         """Raise ValueError for something of a ring on another structure, and for a wave that is not of sines."""
         excitation, ring = self.excitation, isinstance(self.structure, Ring)
-        tables = {"cavity": self.cavity, "friction_damper": self.friction_damper} | self.element_tables
+        tables: dict[str, tuple[Any, ...]] = {"cavity": self.cavity, "friction_damper": self.friction_damper}
+        tables |= self.element_tables
         for table, entries in tables.items():
             for number, entry in enumerate(entries):
                 if entry.sectors is not None and not ring:

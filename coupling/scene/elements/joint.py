@@ -30,7 +30,7 @@ class Joint(SceneElement):
     on_structure = True
     rubs = True
     between: _Points
-    """interface labels of a reduced model whose motions slip on each other, one may be "casing", which does not move; of a
+    """interface labels of a reduced model whose motions slip on each other; one may be "casing", which is at rest; of a
     ring, "tip@+1" is in the next sector"""
     normal: _Points
     """labels of the motions of the same points across the joint, which opens as the first moves on from the second"""

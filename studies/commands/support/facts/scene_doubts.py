@@ -62,12 +62,13 @@ def part_doubts(scene: Scene, mass: float | None) -> Iterator[str]:
 
     scene: as its file has it; mass: of the structure, modal, kg; None where it is not known.
     """
-    for table in ("damper", "friction_damper"):
-        for number, one in enumerate(getattr(scene, table)):
-            if one.friction > _ROUGH:
+    tables = {"damper": scene.damper, "friction_damper": scene.friction_damper} | scene.element_tables
+    for table, entries in tables.items():
+        for number, one in enumerate(entries):
+            if (friction := getattr(one, "friction", 0.0)) > _ROUGH:
                 yield (
-                    f"{table}[{number}].friction: {one.friction:g} is implausible: dry metals have 0.1 to 1, and none "
-                    f"more than {_ROUGH:g}"
+                    f"{table}[{number}].friction: {friction:g} is implausible: dry metals have 0.1 to 1, and none more "
+                    f"than {_ROUGH:g}"
                 )
     for number, cavity in enumerate(scene.cavity):
         if told := fine_gap(cavity.gap):
