@@ -167,4 +167,6 @@ def text_of(number: float) -> str:
 
 
 def _percent(fraction: float | None) -> str:
-    return "not known" if fraction is None or not math.isfinite(fraction) else f"{100.0 * fraction:.2g} %"
+    if fraction is None or not math.isfinite(fraction):
+        return "not known"
+    return f"{float(f'{100.0 * fraction:.2g}'):g} %"
