@@ -11,7 +11,7 @@ import numpy as np
 from vanedamp.files.record import Array, Record
 from vanedamp.studies.design.scenes import UNCERTAIN, Device, words_of
 from vanedamp.studies.design.tables import DesignFile
-from vanedamp.studies.design.verdict import AMBER, GREEN, RED, HeldValue
+from vanedamp.studies.design.verdict import AMBER, GREEN, RED, HeldValue, text_of
 
 _Curve = Annotated[np.ndarray, Array(("frequency",), "m")]
 #: names of what is uncertain, by their paths
@@ -97,7 +97,8 @@ def sentence_of(device: Device, grade: str, ratio: float, at: Mapping[str, Any],
 
 def _short(value: HeldValue) -> str:
     unit = "" if value.unit == "1" else f" {value.unit}"
-    return f"{value.name} {value.value:.3g}{unit}, limit {value.limit:.3g}{unit}"
+    assert value.limit is not None
+    return f"{value.name} {text_of(value.value)}{unit}, limit {text_of(value.limit)}{unit}"
 
 
 def measurement(by_number: Mapping[str, float], amplitude: float, study: DesignFile) -> str:

@@ -20,7 +20,7 @@ GRADES = GREEN, AMBER, RED = "green", "amber", "red"
 #: files of the sources of results, in the folder of the study
 WORST, SPOTS, LIFE = "worst.toml", "stress.toml", "life.h5"
 #: lives above this are not told apart, h
-_ENDLESS = 1e7
+ENDLESS = 1e7
 
 
 @dataclass(frozen=True)
@@ -140,11 +140,11 @@ def _lives(
     if rates:
         spot = max(rates, key=lambda name: rates[name])
         facts, source = spots[spot], f"{SPOTS}: {damage_per_hour.name} at {spot}"
-        value = 1.0 / max(rates[spot], 1.0 / _ENDLESS)
+        value = 1.0 / max(rates[spot], 1.0 / ENDLESS)
         if life is not None and life.damage is not None:
-            most = max(float(life.damage[-1].max()), float(life.time[-1]) / _ENDLESS)
+            most = max(float(life.damage[-1].max()), float(life.time[-1]) / ENDLESS)
             value = float(life.time[-1]) / most if life.vane_hours is None else life.vane_hours
-            value, source = min(value, 1.0 / max(rates[spot], 1.0 / _ENDLESS)), f"{source}, {LIFE}: damage"
+            value, source = min(value, 1.0 / max(rates[spot], 1.0 / ENDLESS)), f"{source}, {LIFE}: damage"
         factor = (1.0 + (facts.error or 0.0)) * (1.0 + _rise(worst))
         exponent = facts.exponent or 1.0
         yield HeldValue(
@@ -161,5 +161,12 @@ def _lives(
         )  # fmt: skip
 
 
+def text_of(number: float) -> str:
+    """Return a number with three digits."""
+    return f"{float(f'{number:.3g}'):.0f}" if 1e3 <= abs(number) < 1e6 else f"{number:.3g}"
+
+
 def _percent(fraction: float | None) -> str:
-    return "not known" if fraction is None or not math.isfinite(fraction) else f"{100.0 * fraction:.2g} %"
+    if fraction is None or not math.isfinite(fraction):
+        return "not known"
+    return f"{float(f'{100.0 * fraction:.2g}'):g} %"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,11 +14,11 @@ from vanedamp.coupling.scene.short_form import short_form
 from vanedamp.coupling.strength.assessment import fatigue_of
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import digest
-from vanedamp.files.toml_input import plain, read_toml, tables
+from vanedamp.files.toml_input import InputError, plain, read_toml, tables
 from vanedamp.files.toml_output import write_commented
 from vanedamp.rom.recovery import hot_spots
 from vanedamp.rom.reduced import ReducedModel
-from vanedamp.studies.case.tables import Case
+from vanedamp.studies.case.tables import Case, InterfaceTable
 from vanedamp.studies.design.record import DesignRecord, measurement, sentence_of
 from vanedamp.studies.design.scenes import LEVELS, PLAIN, Device, Devices, plain_model, words_of
 from vanedamp.studies.design.tables import DesignFile
@@ -105,7 +105,7 @@ class Searches(DesignStage):
         band, effort = devices.frequencies, self.study.effort
         tools.note(
             f"{band[0]:.5g} to {band[-1]:.5g} Hz in {len(band)} steps; {devices.amplitude:.4g} m without bodies; "
-            f"the rest takes about {duration(estimated(devices))}"
+            f"the rest takes about {duration(estimated(devices) / getattr(tools.pool(), '_max_workers', 1))}"
         )
         return f"{len(self.outputs)} searches of {effort.evaluations} designs"
 
@@ -196,9 +196,8 @@ def ranked(confirmed: Sequence[Confirmation]) -> list[Confirmation]:
 
 
 def estimated(devices: Devices) -> float:
-    """Return the time of searches, confirmations and life, s, by a trial of their runs."""
+    """Return the processor time of searches, confirmations and life, s, by a trial of their runs."""
     from vanedamp.studies.jobs.trial import mean_cost
-    from vanedamp.studies.jobs.workers import available_cores
 
     effort, points, total = devices.study.effort, len(devices.frequencies), 0.0
     envelope = devices.study.envelope
@@ -211,7 +210,7 @@ def estimated(devices: Devices) -> float:
         total += points * (cheap * searched + stressed * 3) + confirmed * (points * 3 * effort.draws + effort.starts)
         if devices.study.wear is not None and bodies == envelope.bodies[0]:
             total += stressed * 12 * points
-    return total / available_cores()
+    return total
 
 
 def decided(
@@ -279,10 +278,10 @@ def _assumed(study: DesignFile, devices: Devices, life: LifeRecord | None) -> It
         yield f"{name.removesuffix('_deg')} {low:g} to {high:g}{' degrees' if name.endswith('deg') else ''}" + (
             f", measured: {envelope.pair}" if envelope.pair and name != "orientation_deg" else ""
         )
-    yield f"gap within {1e6 * envelope.gap_tolerance:.3g} um, mass within {envelope.mass_tolerance:.2g} of it"
+    yield f"gap within {1e6 * envelope.gap_tolerance:.3g} um, mass within {100 * envelope.mass_tolerance:.2g} %"
     yield "all bodies have the same friction and restitution in a draw"
     level = " ".join(f"{name} {value:g}" for name, value in operation.level.items()) or "the case's fatigue fraction"
-    yield f"excitation: {level}, {devices.amplitude:.4g} m without bodies"
+    yield f"excitation: {level}, {1e6 * devices.amplitude:.4g} um without bodies"
     yield "operation: " + ("the hours of the spectrum" if operation.spectrum else "the same time at all frequencies")
     contact = devices.at(Device(1, envelope.mass[0], envelope.gap[0]), LEVELS[0]).contact
     yield f"contacts: {contact.law}" + (
@@ -305,11 +304,23 @@ def _neglected(study: DesignFile, best: Confirmation, life: LifeRecord | None) -
     yield "temperature of the bodies, lubrication, dirt in the cavity"
 
 
+def _check_cavities(interface: Mapping[str, InterfaceTable], study: DesignFile, source: Path) -> None:
+    """Raise InputError, before anything runs, where bodies would silently be at the response."""
+    named = any(label.endswith("_floor") or table.planar for label, table in interface.items())
+    if len(interface) > 1 and not named and not study.envelope.cavities:
+        raise InputError(
+            f"{source}: envelope.cavities: the case has no cavity, such as [interface.c1_floor]; "
+            'cavities = ["c1"] puts the bodies where the response is'
+        )
+
+
 def design_stages(study: DesignFile, source: Path, folder: Path) -> Iterator[Stage]:
     """Yield the stages of a study with results in a folder, each after the stages that it depends on."""
-    source, folder = source.resolve(), folder.resolve()
     case, tuned = (source.parent / study.case).resolve(), tuple[Path, ...]()
-    calibration = Case.load(case).calibration
+    loaded = Case.load(case)
+    _check_cavities(loaded.interface, study, source)
+    calibration = loaded.calibration
+    source, folder = source.resolve(), folder.resolve()
     if calibration is not None and (calibration.tune or calibration.damping):
         files = tuple(folder / name for name in (CALIBRATION, TUNED_CASE, RIGID_SCENE))
         yield Calibrate("calibrate", case, files, ())

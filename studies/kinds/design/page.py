@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 
 from vanedamp.files import store
 from vanedamp.studies.design.record import NAMES, DesignRecord
-from vanedamp.studies.design.verdict import HeldValue
+from vanedamp.studies.design.verdict import ENDLESS, RED, HeldValue, text_of
 from vanedamp.studies.kinds.confirmation.page import CURVES, curves_figure
 from vanedamp.studies.report.charts import dressed
 from vanedamp.studies.report.page import Page
@@ -28,7 +28,9 @@ def figure(record: DesignRecord) -> go.Figure:
     for value in record.held:
         if value.limit is not None and value.name.startswith("largest amplitude"):
             height = value.limit * (1.0 if value.unit == "m" else record.reference)
-            drawn.add_hline(y=1e6 * height, line={"dash": "dash", "color": "#be185d"}, annotation_text="limit")
+            drawn.add_hline(y=1e6 * height, line={"dash": "dashdot", "color": "#15803d"}, annotation_text="limit")
+    most = {"annotation_text": "maximum without bodies", "annotation_position": "top left"}
+    drawn.add_hline(y=1e6 * record.reference, line={"dash": "dot", "color": "#475569", "width": 1}, **most)
     return drawn
 
 
@@ -55,15 +57,19 @@ def _row(value: HeldValue) -> dict[str, Any]:
     unit, factor = _UNITS[value.unit]
 
     def text(number: float | None) -> str:
-        return "" if number is None else f"{factor * number:.3g}" if abs(factor * number) < 1e4 else f"{number:.2e}"
+        return "" if number is None else text_of(factor * number)
 
+    lasting = value.least and value.high is None and (value.low == value.value or value.value >= ENDLESS)
     low, high = text(value.low), text(value.high)
     interval = f"{low} to {high}" if low and high else f"from {low}" if low else f"up to {high}" if high else ""
     margin = "" if value.margin is None else f"{value.margin:+.0%}" if value.margin < 10.0 else "more than 10 times"
     limit = "" if value.limit is None else f"{'at least' if value.least else 'at most'} {text(value.limit)}"
+    # a limit that the whole interval is within
+    enough = value.low and 0.995 * value.low if value.least else value.high and 1.005 * value.high
     return {
-        "name": value.name, "unit": unit, "value": text(value.value), "interval": interval, "due": value.due,
-        "limit": limit, "margin": margin, "grade": value.grade, "source": value.source,
+        "enough": text(enough), "doubtful": value.doubtful and value.grade != RED, "least": value.least,
+        "name": value.name, "unit": unit, "value": "≥ " * lasting + text(value.value), "interval": interval,
+        "due": value.due, "limit": limit, "margin": margin, "grade": value.grade, "source": value.source,
     }  # fmt: skip
 
 

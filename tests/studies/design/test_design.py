@@ -18,6 +18,7 @@ from vanedamp.studies.design.scenes import Device, Devices
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.design.verdict import AMBER, GREEN, RED, HeldValue
 from vanedamp.studies.design.worst import Confirmation, _missed, _Runs, confirm, drawn
+from vanedamp.studies.kinds.design.page import _row
 
 CASE = """
 [mesh]
@@ -201,6 +202,7 @@ def test_the_page_shows_every_result_with_its_source(finished):
         assert (folder / "out" / value.source.split(":")[0]).is_file()
     assert html.count('class="verdict') == 1 + sum(bool(value.grade) for value in record.held)
     assert "<svg" in html
+    assert ("It would hold with" in html) == (record.grade != GREEN)
     again = json.loads(json.dumps(DesignRecord.load(folder / "out/design.h5").to_json()))
     assert again["device"] == record.device
 
@@ -224,6 +226,14 @@ def test_grades(value, low, high, least, doubtful, grade):
     held = HeldValue("x", "1", value, low, high, "", "", 0.5, least, doubtful)
     assert held.grade == grade
     assert held.margin == pytest.approx((value - 0.5 if least else 0.5 - value) / 0.5)
+
+
+def test_the_page_names_a_limit_that_the_interval_is_within():
+    least = HeldValue("life", "h", 4000.0, 3333.3, None, "", "", 5000.0, least=True)
+    assert _row(least)["enough"] == "3320"
+    most = HeldValue("amplitude", "m", 4e-5, 4e-5, 4.449e-5, "", "", 1e-5)
+    assert _row(most)["enough"] == "44.7"
+    assert _row(replace(least, value=5000.0, low=5000.0))["value"] == "≥ 5000"
 
 
 def test_what_was_missed_covers_the_end_of_a_distribution():
@@ -303,6 +313,16 @@ def test_bad_input_is_named(tmp_path, monkeypatch, capsys, old, new, error):
     message = capsys.readouterr().err
     assert re.search(error, message), message
     assert not (tmp_path / "out").exists()
+
+
+def test_a_case_without_the_name_of_a_cavity_is_rejected(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.toml").write_text(CASE.replace("[interface.c1_floor]", "[interface.pocket]"))
+    (tmp_path / "design.toml").write_text(STUDY)
+    assert main(["check", "design.toml"]) == BAD_INPUT
+    assert "the case has no cavity" in capsys.readouterr().err
+    (tmp_path / "design.toml").write_text(changed(STUDY, ("bodies = [1, 2]", 'cavities = ["c1"]')))
+    assert main(["design", "design.toml", "--dry-run"]) == 0
 
 
 def test_a_new_study_is_read(tmp_path, monkeypatch, capsys):
