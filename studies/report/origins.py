@@ -18,7 +18,7 @@ _BESIDES, _TYPED = {"frequency", "damping ratio", "mesh"}, 5e-3
 
 
 def _model(result: Result) -> dict[str, Any] | None:
-    """Return what is known of a result's model, by name; None without a structure, or with several."""
+    """Return what is known of a result's model, by name; None without one, or with several."""
     made, numbers, study = result.provenance or {}, result.rigid, getattr(result.record, "study", None)
     scene = study.get("scene") if isinstance(study, Mapping) else result.scene
     made_of = made.get("model_made_of", made.get("ring", {} if scene else made))
@@ -29,7 +29,9 @@ def _model(result: Result) -> dict[str, Any] | None:
     made_of = made_of.get("matrices") or made_of
     stated = leaves({key: made_of[key] for key in _MATRICES if key in made_of})
     # files round numbers
-    facts = {path: f"{value:.6g}" if isinstance(value, float) else str(value) for path, value in stated.items()}
+    facts: dict[str, Any] = {
+        path: f"{value:.6g}" if isinstance(value, float) else str(value) for path, value in stated.items()
+    }
     if "stiffness" in numbers:
         facts["frequency"] = math.sqrt(numbers["stiffness"] / numbers["mass"]) / (2.0 * math.pi)
     known = {"mesh": made_of.get("mesh"), "damping ratio": numbers.get("damping_ratio")}
@@ -50,7 +52,7 @@ def _agree(one: dict[str, Any], other: dict[str, Any]) -> bool | None:
 
 
 def _varied(result: Result) -> set[tuple[str, str]]:
-    """Return tables and keys that vary."""
+    """Return what varies."""
     scene = result.scene or {}
     paths = [*scene.get("sweep", ()), *scene.get("ranges", ()), getattr(result.record, "parameter", "")]
     return {(path.partition(".")[0], path.rpartition(".")[2]) for path in paths}

@@ -101,7 +101,7 @@ class Page:
         return responses
 
     def coloured(self, responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:
-        """Return the curves of a chart in colours: a device has one all over the page."""
+        """Return the curves of a chart in colours, each device in its own."""
         curves: list[ForcedResponse] = []
         for response in responses:
             colour, used = self.colours.get(response.design), [curve.colour for curve in curves]

@@ -1,4 +1,4 @@
-"""Results of different models, meshes and devices on one page: what differs is named, and only that."""
+"""Results of several models and devices."""
 
 import re
 from dataclasses import replace
@@ -16,7 +16,6 @@ structure = {model = "rom", file = "FILE.h5"}
 excitation = {frequency = 830.0, force = 1.0, at = "tip"}
 cavity = [{name = "c1", gap = 4e-5, floor = "tip"}]
 damper = [{cavity = "c1", mass = 0.001, friction = 0.3, restitution = 0.6}]
-time = {periods = 30, transient = 20}
 sweep = {"excitation.frequency" = [820.0, 830.0]}
 """
 NAMES = {"on_case), c1.gap = 40": ", force = 1 N", "narrow), c1.gap = 20": ", force = 1 N", "forces), c1.gap = 40": ""}
@@ -51,23 +50,23 @@ def folder(tmp_path_factory):
 def page(folder, *names):
     write_report(collect([folder / f"{name}.h5" for name in names]), folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")
-    note = re.search(r'<div class="apart">(.*?)</div>', text, re.DOTALL)
-    lines = [] if note is None else re.findall(r"<(?:li|p)>(.*?)</(?:li|p)>", note[1])
+    note = "".join(re.findall(r'<div class="apart">.*?</div>', text, re.DOTALL))
+    lines = re.findall(r"<(?:li|p)>(.*?)</(?:li|p)>", note)
     curves = {name: colour for colour, name in re.findall(r'background: (#\w+)"></span> (.*?)</label>', text)}
     return re.findall("<h2[^>]*>(.*?)</h2>", text), lines, curves
 
 
-def test_what_belongs_together_is_shown_without_a_word(folder):
+def test_no_word_of_what_belongs_together(folder):
     headings, lines, curves = page(folder, "calibration", "modes_tuned", "rom_tuned", "on_tuned")
     assert (headings[1], lines, [*curves]) == ("Modes", [], ["reduced model"])
     assert page(folder, "modes_tuned", "rigid")[1] == []
 
 
-def test_untuned_modes_beside_tuned_curves(folder):
+def test_untuned_modes(folder):
     headings, lines, curves = page(folder, "modes_case", "calibration", "on_tuned")
     untuned, tuned = "young = 2e+11, before calibration.h5", lines[2].rpartition(": ")[2]
     assert lines[1:] == [f"modes_case.h5: {untuned}", f"calibration.h5, on_tuned.h5: {tuned}"]
-    assert re.fullmatch(r"young = 2\.\d+e\+11, as calibrated", tuned)
+    assert tuned.endswith(", as calibrated")
     assert (headings[1], [*curves]) == (f"Modes: {untuned}", [f"reduced model, {tuned}"])
 
 
@@ -78,13 +77,13 @@ def test_meshes_are_named(folder):
     assert (headings[1], [*curves]) == (f"Modes: {finer}", [f"reduced model, {mine}"])
 
 
-def test_a_device_has_its_name_and_colour_all_over_the_page(folder):
+def test_a_device_has_one_colour(folder):
     _, lines, curves = page(folder, "on_case", "narrow", "forces")
     wide, narrow, along = (curves[f"reduced model ({name} µm{force}"] for name, force in NAMES.items())
     assert (lines, along) == ([], wide)
     assert wide != narrow
 
 
-def test_what_files_do_not_tell_is_not_guessed(folder):
+def test_nothing_is_guessed(folder):
     told = "Whether old.h5 belongs to modes_case.h5 is not known: the files do not tell."
     assert page(folder, "modes_case", "old")[1] == [told]

@@ -32,7 +32,6 @@ from vanedamp.studies.report.page import body_note, write_report
 from vanedamp.studies.report.results import collect
 
 FREQUENCIES = (np.linspace(0.97, 1.02, 7) * RESONANCE).tolist()
-#: beside the modes of another structure
 ONE, TWO = (f"rigid model (sweep_{name}), frequency = 15.9155 Hz" for name in ("one", "two"))
 
 
