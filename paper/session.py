@@ -8,13 +8,17 @@ from pathlib import Path
 
 from paper.figure_scenes import PaperScenes
 from vanedamp.coupling.sweep.record import Sweep
+from vanedamp.coupling.system.reduced_model_file import origin_in_file
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import StoreError, load
 from vanedamp.files.toml_input import InputError
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.demo.figure_file import FigureScenes, FigureStructure
-from vanedamp.studies.demo.figure_study import CASE, MODES, Session, prepare, provenance
+from vanedamp.studies.demo.figure_study import CASE, MODES, Session, prepare
+
+#: of a provenance, decide whether a sweep is made again
+_MADE = ("versions", "model")
 
 
 @dataclass(frozen=True)
@@ -34,8 +38,8 @@ class PaperSession(Session):
         """Return the sweep of a curve: of this session, of the folder with `resume`, or computed."""
         scene, stem = figure.scenes[curve], figure.stem(curve)
         old = self.computed.get(stem) or (_kept(self.folder / f"{stem}.h5") if self.resume else None)
-        made = provenance(scene)
-        if old is None or old.scene != scene or any(old.provenance.get(key) != made[key] for key in made):
+        made = {"versions": versions()} | origin_in_file(scene.structure)
+        if old is None or old.scene != scene or any(old.provenance.get(key) != made.get(key) for key in _MADE):
             old = super().swept(figure, curve)
         self.computed[stem] = old
         return old

@@ -133,6 +133,20 @@ class Headline:
         return asdict(self) | ratios | {"too_coarse": self.too_coarse}
 
 
+def leaves(data: Any, path: str = "") -> dict[str, Any]:
+    """Return the values of nested data by dotted paths; tables in lists go by names or indices."""
+    items: list[tuple[str, Any]]
+    if isinstance(data, Mapping) and data:
+        items = list(data.items())
+    elif isinstance(data, list | tuple) and data and all(isinstance(entry, Mapping) for entry in data):
+        items = [(str(entry.get("name", index)), entry) for index, entry in enumerate(data)]
+    else:
+        return {path: data} if path else {}
+    return {
+        key: value for name, inner in items for key, value in leaves(inner, f"{path}.{name}" if path else name).items()
+    }
+
+
 def format_value(value: Any) -> str:
     """Return a value of an axis in a few digits; text as it is."""
     return str(value) if isinstance(value, str) else f"{value:.6g}"

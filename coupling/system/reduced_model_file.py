@@ -10,7 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.scene.mistuning import Mistuning
 from vanedamp.coupling.scene.structures import Ring, Rom, Structure
-from vanedamp.files.store import file_stamp
+from vanedamp.files.store import digest, file_stamp
 from vanedamp.files.toml_input import InputError
 from vanedamp.rom.checks import ReducedModelError
 from vanedamp.rom.recovery import hot_spots
@@ -90,6 +90,15 @@ def hot_spots_in_file(structure: Structure) -> dict[str, dict[str, Any]]:
     if not isinstance(structure, Rom):
         return {}
     return hot_spots(_whole(structure))
+
+
+def origin_in_file(structure: Structure) -> dict[str, Any]:
+    """Return what a result records of the model in a file: its hash, and what it was made of; empty without a file."""
+    if not isinstance(structure, Rom):
+        return {}
+    whole = _whole(structure)
+    made_of = {"damping_ratio": whole.damping_ratio, "matrices": whole.provenance.get("matrices", {})}
+    return {"model": digest(structure.file), "model_made_of": made_of}
 
 
 def coordinates_in_file(structure: Rom) -> int:

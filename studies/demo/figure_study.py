@@ -9,16 +9,14 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from vanedamp.coupling.scene.rotation import FREQUENCY
 from vanedamp.coupling.scene.scene import Scene, relative
 from vanedamp.coupling.scene.short_form import short_form
-from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.checkpoint_file import clear
-from vanedamp.files.provenance import versions
-from vanedamp.files.store import digest, finite, write_json
+from vanedamp.files.store import finite, write_json
 from vanedamp.files.toml_output import schema_name, write_commented, write_schema
 from vanedamp.meshes.vane_cluster import SHIPPED
 from vanedamp.studies.demo.curve import DampedCurve, curves, worst_of
@@ -69,7 +67,7 @@ class Session:
         if not self.resume:
             clear(checkpoint)
         write_scene(scene, path.with_suffix(".toml"), f"{figure.title}{f': {curve}' if curve else ''}")
-        job = SweepJob(str(path), scene, provenance=provenance(scene))
+        job = SweepJob(str(path), scene)
         outcome, _ = job.run(lambda: self.pool, checkpoint, stem)
         outcome.record.save(str(path))
         outcome.clear(checkpoint)
@@ -118,12 +116,6 @@ def study(of: FigureStudy, session: Session) -> ClaimStudy:
         claims = [replace(claim, why=(claim.why + failed).strip()) for claim in claims]
     sources = [f"{figure.stem(curve)}.h5" for curve in sweeps]
     return written(ClaimStudy(figure.name, figure.title, sources, claims, ", ".join(trouble)), session.folder)
-
-
-def provenance(scene: Scene) -> dict[str, Any]:
-    """Return the provenance of a sweep's result: versions, and the digest of its reduced model."""
-    model = {"model": digest(scene.structure.file)} if isinstance(scene.structure, Rom) else {}
-    return {"versions": versions()} | model
 
 
 def _trouble(curve: str, sweep: Sweep) -> list[str]:

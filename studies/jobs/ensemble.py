@@ -13,7 +13,6 @@ from vanedamp.coupling.ensembles.ensemble import ensemble
 from vanedamp.coupling.ensembles.members import Members, members
 from vanedamp.coupling.ensembles.record import Ensemble, spreads
 from vanedamp.coupling.scene.scene import Scene
-from vanedamp.files.provenance import versions
 from vanedamp.studies.jobs.budget import check_sweep
 from vanedamp.studies.jobs.job import JobResult, Means, SceneJob, choice_notes
 from vanedamp.studies.jobs.points import ends_of, finished
@@ -48,7 +47,7 @@ class EnsembleJob(SceneJob):
 
     def finished(self, checkpoint: Path | None) -> int:
         """Return the number of points in a checkpoint."""
-        return finished(checkpoint, self.of, self.points.size, {"versions": versions()})
+        return finished(checkpoint, self.of, self.points.size, self.origin)
 
     def compiled(self) -> Iterable[Scene]:
         """Return the scenes of the first and the last point."""

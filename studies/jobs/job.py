@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.reduced_model_file import origin_in_file
 from vanedamp.files.checkpoint_file import clear
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import clear_leftovers
@@ -131,6 +132,11 @@ class Job(ABC):
     def check(self, workers: int) -> None:  # noqa: B027
         """Reject a job that takes too long or too much memory. Raises InputError."""
 
+    @property
+    def origin(self) -> dict[str, Any]:
+        """What its result records: versions, and the model of its scene."""
+        return {"versions": versions()} | ({} if self.scene is None else origin_in_file(self.scene.structure))
+
     def notes(self) -> Iterable[str]:
         """Return notes to print before it runs."""
         return ()
@@ -172,7 +178,7 @@ class Job(ABC):
 
             compile_engine(scenes, processes)
         with progress(title or self.TITLE) as report:
-            outcome = self.work(Means(processes, report, checkpoint, {"versions": versions()}, finished))
+            outcome = self.work(Means(processes, report, checkpoint, self.origin, finished))
         return outcome, time.perf_counter() - started
 
 

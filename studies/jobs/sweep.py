@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,7 +16,6 @@ from vanedamp.coupling.simulation import simulate
 from vanedamp.coupling.sweep.grid import Grid, Points, grid
 from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.coupling.sweep.sweep import sweep
-from vanedamp.files.provenance import versions
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.jobs.budget import check_run, check_sweep
@@ -38,12 +37,11 @@ class SweepJob(SceneJob):
     """Runs a scene at every point of its sweep.
 
     peak: file for the point with the highest mean, which is run again with events and samples;
-    moved_starts: also run the peak of each curve with displaced bodies; provenance: further data of the result.
+    moved_starts: also run the peak of each curve with displaced bodies.
     """
 
     peak: str | None = None
     moved_starts: bool = True
-    provenance: Mapping[str, Any] = field(default_factory=dict)
     TITLE: ClassVar[str] = "sweep"
     PARALLEL: ClassVar[bool] = True
 
@@ -97,7 +95,7 @@ class SweepJob(SceneJob):
 
     def finished(self, checkpoint: Path | None) -> int:
         """Return the number of points in a checkpoint."""
-        return finished(checkpoint, self.of, self.points.size, {"versions": versions()} | dict(self.provenance))
+        return finished(checkpoint, self.of, self.points.size, self.origin)
 
     def compiled(self) -> Iterable[Scene]:
         """Return the scenes of the first and the last point."""
@@ -106,8 +104,7 @@ class SweepJob(SceneJob):
     def work(self, means: Means) -> JobResult:
         """Run all unfinished points, and the point with the highest mean again."""
         resumed, points = means.finished, self.points
-        provenance = means.provenance | dict(self.provenance)
-        result = sweep(points, means.pool, means.report, means.checkpoint, provenance, self.moved_starts)
+        result = sweep(points, means.pool, means.report, means.checkpoint, means.provenance, self.moved_starts)
         responses = forced_responses(result)
         judged = designs(responses)
         new = [text for text in dict.fromkeys([*result.warnings, *result.provenance.get("warnings", ())])
@@ -151,9 +148,10 @@ def peak(points: Grid, result: Sweep, path: str) -> tuple[str, dict[str, Write]]
             chosen.scene, events=True, samples_per_period=PEAK_SAMPLES, start=chosen.start, progress=report
         )  # fmt: skip
     response = replace(response, advice=chosen.advice)
-    provenance = {"versions": result.provenance.get("versions", {}), "scene": chosen.scene.to_dict()}
+    made = {key: value for key, value in result.provenance.items() if key.partition("_")[0] in ("versions", "model")}
     at = ", ".join(f"{axis} = {format_value(value)}" for axis, value in values.items())
-    return f"--peak: {path} is the run at {at}", {"peak": lambda file: response.save(file, provenance)}
+    made |= {"scene": chosen.scene.to_dict()}
+    return f"--peak: {path} is the run at {at}", {"peak": lambda file: response.save(file, made)}
 
 
 def _summary(result: Sweep, judged: Sequence[DesignCurves], size: str, seconds: float) -> Iterator[str]:

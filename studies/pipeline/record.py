@@ -10,6 +10,7 @@ from typing import Any
 from vanedamp.files.foreign import reading
 from vanedamp.files.store import digest, write_json
 from vanedamp.files.toml_input import InputError
+from vanedamp.studies.headline import leaves
 
 _KIND = "vanedamp pipeline"
 #: changes of one file that are reported, and entries of a list
@@ -97,20 +98,6 @@ def changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
         reported = [f"{path} {_pair(one.get(path), other.get(path))}" for path in paths[:_MOST]]
         more = f" and {len(paths) - _MOST} more" if len(paths) > _MOST else ""
         yield f"{subject} changed: {', '.join(reported)}{more}"
-
-
-def leaves(data: Any, path: str = "") -> dict[str, Any]:
-    """Return the values of nested data by dotted paths; tables in lists go by names or indices."""
-    items: list[tuple[str, Any]]
-    if isinstance(data, dict) and data:
-        items = list(data.items())
-    elif isinstance(data, list) and data and all(isinstance(entry, dict) for entry in data):
-        items = [(str(entry.get("name", index)), entry) for index, entry in enumerate(data)]
-    else:
-        return {path: data}
-    return {
-        key: value for name, inner in items for key, value in leaves(inner, f"{path}.{name}" if path else name).items()
-    }
 
 
 def _lost(digests: Mapping[str, str | None], outputs: Sequence[Path]) -> Iterator[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 from vanedamp.coupling.quantities.impacts import attached_mass_fraction, impacts_per_period
 from vanedamp.coupling.quantities.in_plane import wall_impacts
 from vanedamp.coupling.quantities.quantity import QuantityRecord, table
+from vanedamp.coupling.scene.paths import assign
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rigid, Rom
 from vanedamp.coupling.sweep.designs import amplitude_known, is_choice
@@ -22,7 +23,7 @@ from vanedamp.coupling.sweep.steady_states import is_start
 from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_responses
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
-from vanedamp.studies.headline import Headline, format_value, headline, reference_of
+from vanedamp.studies.headline import Headline, format_value, headline, leaves, reference_of
 
 #: relative difference allowed between a linear amplitude computed again and the sweep's
 _SAME = 1e-6
@@ -54,7 +55,7 @@ class ForcedResponse(QuantityRecord):
     onset_of           impacts whose first place is the onset
     hertz              frequency of a unit of the axis, Hz: of a speed along an engine order, 1 of a frequency; nan else
     settings           values of the sweep's other axes by path
-    source             the file it comes from
+    source, colour     the file it comes from; its colour on a page
     peak_known         whether the peak is certain: no failed point can be higher
     design, start      identifiers of the parameters that the designer chooses, and of the start of its runs
     """
@@ -75,6 +76,7 @@ class ForcedResponse(QuantityRecord):
     onset_of: str = "impacts on walls"
     settings: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
+    colour: str = ""
     peak_known: bool = True
     design: Hashable = None
     start: Hashable = None
@@ -116,8 +118,8 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
     order = np.argsort(sweep.axes[paths[along]], kind="stable")
     other_values = [sweep.axes[path] for index, path in enumerate(paths) if index != along]
     labels = [path for index, path in enumerate(paths) if index != along]
-    leaves = [(path, value) for path, value in _leaves(sweep.scene.to_dict()) if path not in paths]
-    base = [frozenset(leaf for leaf in leaves if of(leaf[0])) for of in (is_choice, is_start)]
+    data = sweep.scene.to_dict()
+    assign(data, paths[along], None)
     responses = []
     for combination in itertools.product(*(range(len(values)) for values in other_values)):
         point: tuple[Any, ...] = (*combination[:along], order, *combination[along:])
@@ -125,22 +127,13 @@ def forced_responses(sweep: Sweep, name: str | None = None) -> list[ForcedRespon
         settings = {path: axis[index] for path, axis, index in zip(labels, other_values, combination, strict=True)}
         values = [setting(path, value, units[path]) for path, value in settings.items()]
         title = ", ".join([name or model_name(sweep.scene), *values])
-        design, start = (
-            (shared, *((path, value) for path, value in settings.items() if of(path)))
-            for shared, of in zip(base, (is_choice, is_start), strict=True)
-        )
+        for path, value in settings.items():
+            assign(data, path, value)
+        of_run = [(path, str(value)) for path, value in leaves(data).items()]
+        design, start = (frozenset(leaf for leaf in of_run if of(leaf[0])) for of in (is_choice, is_start))
         response = response_along(sweep, point, paths[along], title, settings)
         responses.append(replace(response, design=design, start=start))
     return responses
-
-
-def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Hashable]]:
-    """Yield the values of nested tables and lists by their dotted paths."""
-    if isinstance(value, Mapping | list | tuple):
-        for key, item in value.items() if isinstance(value, Mapping) else enumerate(value):
-            yield from _leaves(item, f"{path}.{key}" if path else str(key))
-    else:
-        yield path, value
 
 
 def response_along(

@@ -42,7 +42,7 @@ def responses_figure(
     first; `curves.js` adds the others, with the table next to the chart as legend. Default: all, with a legend.
     """
     figure = go.Figure()
-    colours = cycle(len(responses))
+    colours = cycle(responses)
     for curve in ("undamped", "fixed"):
         for owners, response, curves in _distinct(responses, linear or [entry.linear for entry in responses], curve):
             colour = _SHARED if len(owners) > 1 else colours[responses.index(response)]
@@ -153,7 +153,7 @@ def _add_panels(
 def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
     """Draw attached mass fraction and impacts per period; shown: as of `responses_figure`."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
-    for response, colour in zip(responses, cycle(len(responses)), strict=True):
+    for response, colour in zip(responses, cycle(responses), strict=True):
         panels = ((response.attached_mass_fraction, None), (response.impacts_per_period, None))
         _add_panels(figure, response, shown, response.name, {"color": colour}, panels)
     figure.add_hline(y=1, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
@@ -218,7 +218,7 @@ def plane_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | N
     shown: as of `responses_figure`.
     """
     figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05)
-    for response, colour in zip(responses, cycle(len(responses)), strict=True):
+    for response, colour in zip(responses, cycle(responses), strict=True):
         for body, name in bodies_in_plane(response):
             panels = [
                 (factor * response.in_plane[key][:, body], f"{name}: {value}<extra></extra>")
@@ -241,9 +241,9 @@ def bodies_in_plane(response: ForcedResponse) -> list[tuple[int, str]]:
     return [(body, f"{response.name}, body {body + 1}" if several else response.name) for body in extended]
 
 
-def cycle(count: int) -> list[str]:
-    """Return the colours of a number of curves in their order."""
-    return [COLOURS[index % len(COLOURS)] for index in range(count)]
+def cycle(responses: Sequence[ForcedResponse]) -> list[str]:
+    """Return the colours of curves: their own, or those of their order."""
+    return [response.colour or COLOURS[index % len(COLOURS)] for index, response in enumerate(responses)]
 
 
 def _finish(figure: go.Figure, responses: Sequence[ForcedResponse], height: int) -> go.Figure:

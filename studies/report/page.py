@@ -7,7 +7,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -19,14 +19,18 @@ import plotly.offline
 from markupsafe import Markup
 
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.sweep.record import Sweep
 from vanedamp.files.provenance import versions
 from vanedamp.files.store import csv_text, decoding, digest, replacing
-from vanedamp.studies.headline import without_round_off
+from vanedamp.studies.headline import leaves, without_round_off
 from vanedamp.studies.hot_spots import plus_minus
-from vanedamp.studies.report.charts import Chart, chart
+from vanedamp.studies.report.charts import COLOURS, Chart, chart
 from vanedamp.studies.report.claims import CLAIMS, ClaimStudy
+from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, model_name
+from vanedamp.studies.report.map_chart import has_responses
 from vanedamp.studies.report.motion import RunFrames
 from vanedamp.studies.report.motion_page import environment
+from vanedamp.studies.report.origins import Origins
 from vanedamp.studies.report.results import ReportSection, Result, Results, format_setting, sections
 from vanedamp.studies.report.summary import summary
 
@@ -49,17 +53,21 @@ class Page:
 
     known   the sections by the kind of result that they show
     names   short names of the result files by path
+    origins what differs
     study   name of the study that the results belong to; None for results of their own
     charts  charts made so far, by the first part of their name
+    colours of devices
     common  pieces that templates move to a common section, by the calls of _COMMON
     """
 
     results: Results
     known: Mapping[str, ReportSection]
     names: Mapping[str, str]
+    origins: Origins
     environment: jinja2.Environment
     study: str | None = None
     charts: Counter[str] = field(default_factory=Counter)
+    colours: dict[Hashable, str] = field(default_factory=dict)
     common: dict[str, list[str]] = field(default_factory=lambda: {name: [] for name in _COMMON})
 
     def chart(
@@ -76,6 +84,32 @@ class Page:
         self.charts["motion"] += 1
         html = self.environment.get_template("motion.html").render(name=name, data=motion.to_json())
         return Chart(name, html, csv_text(motion.header(), motion.rows()), tuple(files))
+
+    def responses(self, sweeps: Mapping[str, Sweep]) -> list[ForcedResponse]:
+        """Return the curves of sweeps; curves of a study are named after their files, others after their models."""
+        sweeps = {file: sweep for file, sweep in sweeps.items() if has_responses(sweep)}
+        models = [model_name(sweep.scene) for sweep in sweeps.values()]
+        responses = []
+        for model, (file, sweep) in zip(models, sweeps.items(), strict=True):
+            stem = self.names[file].removesuffix(".h5")
+            if self.study is not None:
+                name = stem.removeprefix(self.study).strip("_").replace("_", " ") or model
+            else:
+                name = model if models.count(model) == 1 else f"{model} ({stem})"
+                name = ", ".join(filter(None, [name, self.origins.label(file)]))
+            responses += [replace(response, source=file) for response in forced_responses(sweep, name)]
+        return responses
+
+    def coloured(self, responses: Iterable[ForcedResponse]) -> list[ForcedResponse]:
+        """Return the curves of a chart in colours, each device in its own."""
+        curves: list[ForcedResponse] = []
+        for response in responses:
+            colour, used = self.colours.get(response.design), [curve.colour for curve in curves]
+            if colour is None or colour in used:
+                colour = min(COLOURS, key=lambda each: (used.count(each), [*self.colours.values()].count(each)))
+            self.colours.setdefault(response.design, colour)
+            curves.append(replace(response, colour=colour))
+        return curves
 
     def blocks(self) -> str:
         """Return the sections of all results, as HTML; sections of a study have its title."""
@@ -127,7 +161,8 @@ def write_report(results: Results, path: str | Path, title: str | None = None) -
 def _html(results: Results, title: str | None) -> str:
     """Return the text of the page."""
     names, by_file = results.names, results.by_file
-    page = Page(results, sections(), names, _environment(names))
+    origins = Origins(results)
+    page = Page(results, sections(), names, origins, _environment(names, origins))
     beginning = summary(results, page)
     blocks, contents = _with_contents(page.blocks())
     scenes = {names[file]: _flat(result.scene) for file, result in by_file.items() if result.scene is not None}
@@ -135,6 +170,7 @@ def _html(results: Results, title: str | None) -> str:
     return page.environment.get_template("report.html").render(
         title=title or ("Forced response with loose damper bodies" if bodies else "Vibration of the structure"),
         bodies=bodies,
+        origins=origins,
         summary=beginning,
         contents=contents,
         plotly=plotly.offline.get_plotlyjs() if page.charts else None,
@@ -158,12 +194,13 @@ def _with_contents(blocks: str) -> tuple[str, dict[str, Markup]]:
     return re.sub("<h2>(.*?)</h2>", anchored, blocks, flags=re.DOTALL), contents
 
 
-def _environment(names: Mapping[str, str]) -> jinja2.Environment:
+def _environment(names: Mapping[str, str], origins: Origins) -> jinja2.Environment:
     """Return the common tools of all templates: filters, and the macro `plot` of a chart."""
     shared = environment()
     shared.filters |= {"ratio": lambda value: "none" if value is None or not math.isfinite(value) else f"{value:z.3f}"}
     shared.filters["clean"] = without_round_off
     shared.filters["plus_minus"] = lambda error: plus_minus(error or None)  # files before 0.4 have none
+    shared.filters["told"] = lambda file: f": {label}" if (label := origins.label(file)) else ""
     shared.filters |= {"name": names.__getitem__, "anchor": lambda file: _anchor(names[file])}
     shared.globals["plot"] = shared.get_template("plot.html").make_module().plot  # type: ignore[attr-defined]
     return shared
@@ -214,17 +251,12 @@ def _compared(scenes: Mapping[str, dict[str, str]]) -> dict[str, Any]:
     return {"common": common, "differing": differing, "most_columns": _MOST_COLUMNS, "owners": _by_owners(different)}
 
 
-def _flat(data: Any, path: str = "") -> dict[str, str]:
+def _flat(data: Any) -> dict[str, str]:
     """Return nested data as text by dotted path."""
-    if isinstance(data, Mapping):
-        items = [(f"{path}.{key}" if path else str(key), value) for key, value in data.items()]
-    elif isinstance(data, list | tuple) and any(isinstance(entry, Mapping | list | tuple) for entry in data):
-        items = [(f"{path}[{index}]", value) for index, value in enumerate(data)]
-    elif isinstance(data, list | tuple):
-        return {path: ", ".join(map(str, data))}
-    else:
-        return {path: format_setting(data)}
-    return {key: text for name, value in items for key, text in _flat(value, name).items()}
+    return {
+        path: ", ".join(map(str, value)) if isinstance(value, list | tuple) else format_setting(value)
+        for path, value in leaves(data).items() if value != {}
+    }  # fmt: skip
 
 
 def body_note(notes: Mapping[str, Any], scene: Scene | None) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import pkgutil
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
@@ -28,19 +28,20 @@ class Result:
     provenance  how it was made, as nested data; None if the page has no table of that
     scene       what was run, as nested data, for the page's comparison of scenes
     parts       names of files in its folder whose results belong to it, a study
+    rigid       numbers of its rigid model, if known
     """
 
     record: Any
     provenance: Mapping[str, Any] | None = None
     scene: Mapping[str, Any] | None = None
     parts: tuple[str, ...] = ()
+    rigid: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, record: Any, scene: Mapping[str, Any] | None = None) -> Result:
         """Return the result of a record with a provenance, without the scene, which the page shows separately."""
-        return cls(
-            record, {key: value for key, value in getattr(record, "provenance", {}).items() if key != "scene"}, scene
-        )
+        made = {key: value for key, value in getattr(record, "provenance", {}).items() if key != "scene"}
+        return cls(record, made, scene, rigid={"damping_ratio": getattr(record, "damping_ratio", None)})
 
 
 class ReportSection(Protocol):

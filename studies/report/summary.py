@@ -6,7 +6,6 @@ import base64
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,8 @@ from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.hot_spots import plus_minus
 from vanedamp.studies.report.designs import DesignCurves, designs
-from vanedamp.studies.report.forced_response import forced_responses, linear_curves, model_name
+from vanedamp.studies.report.forced_response import linear_curves, model_name
 from vanedamp.studies.report.forced_response_charts import responses_figure
-from vanedamp.studies.report.map_chart import has_responses
 from vanedamp.studies.report.pictures import mode_picture
 from vanedamp.studies.report.results import Results
 
@@ -29,36 +27,33 @@ _COLUMNS = ("undamped", "fixed", "damped_max", "damped_mean", "confidence")
 def summary(results: Results, page: Any) -> dict[str, Any]:
     """Return picture and facts of the structure, the bodies, and the answer; page: a studies.report.page.Page."""
     answer: list[str] = []
-    scene, chart = None, None
-    responses = [
-        replace(response, source=file)
-        for file, result in results.kinds["sweep"].items()
-        if has_responses(result.record)
-        for response in forced_responses(result.record)
-    ]
+    scene, chart, source = None, None, ""
+    responses = page.responses({file: result.record for file, result in results.kinds["sweep"].items()})
     if responses:
         judged = designs(responses)
-        best = judged[0].worst
-        sweep = results.kinds["sweep"][best.source].record
+        (best,) = page.coloured([judged[0].worst])
+        source = best.source
+        sweep = results.kinds["sweep"][source].record
         scene = base_scene(sweep.scene).replace(best.settings)
         answer += _answer(judged[0], len(judged))
         rows = zip(best.x.tolist(), *(getattr(best, name).tolist() for name in _COLUMNS), strict=True)
         figure = responses_figure([best], [linear_curves(sweep, best)])
-        chart = page.chart("summary", figure, (best.axis, *_COLUMNS), rows, [best.source])
+        chart = page.chart("summary", figure, (best.axis, *_COLUMNS), rows, [source])
     elif results.kinds["response"]:
         history = next(iter(results.kinds["response"].values())).record
         scene = history.scene
         answer.append(_of_run(history.measures))
     for kind in ("optimisation", "life", "identification"):
         answer += [result.record.sentence for result in results.kinds[kind].values()]
-    picture, facts, mass = _structure(results, scene)
+    picture, facts, mass = _structure(page, scene, source)
     bodies = [] if scene is None else list(_bodies(scene, mass))
     return {"picture": picture, "facts": facts, "bodies": bodies, "answer": answer, "chart": chart}
 
 
-def _structure(results: Results, scene: Scene | None) -> tuple[str | None, dict[str, str], float]:
-    """Return the picture of the first bending, facts by their names, and the mass that moves in it, kg."""
-    for file, result in results.kinds["modes"].items():
+def _structure(page: Any, scene: Scene | None, source: str) -> tuple[str | None, dict[str, str], float]:
+    """Return the picture of the first bending, facts by name, and the mass that moves in it, kg; source: preferred."""
+    model = page.origins.group(source)
+    for file, result in sorted(page.results.kinds["modes"].items(), key=lambda item: item[0] not in model):
         values, attributes = result.record
         if "first_bending" in attributes:
             mode = int(attributes["first_bending"])
@@ -66,6 +61,8 @@ def _structure(results: Results, scene: Scene | None) -> tuple[str | None, dict[
             facts = {"first bending": f"{values['frequency'][mode]:.2f} Hz, mode {mode + 1}"}
             facts["mass that can move"] = f"{values['movable_mass'].max():.4g} kg"
             mass = math.nan
+            if label := page.origins.label(file):
+                facts["of"] = f"{page.names[file]}: {label}"
             if "rigid" in attributes:
                 rigid = json.loads(attributes["rigid"])
                 mass = rigid["mass"]

@@ -129,6 +129,7 @@ def test_the_stages_hand_over_their_results(finished):
     assert scene.excitation.resonance_amplitude == excitation["amplitude"]
     assert Path(Sweep.load(folder / "out" / "reduced.h5").scene.structure.file).samefile(folder / "out" / "rom.h5")
     page = (folder / "out" / "report.html").read_text()
+    assert "<li>own.h5, own_peak.h5: frequency = 15.9155 Hz, damping ratio = 0.01</li>" in page
     assert all(f"{name}.h5" in page for name in ("calibration", "modes", "rom", "gaps", "reduced", "own", "own_peak"))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ _MOST = 4
 def load(path: Path) -> Result:
     """Read what `vanedamp calibrate` wrote."""
     record = CalibrationRecord.load(path)
-    return Result(record, {"matrices": record.provenance, "versions": record.versions})
+    return Result(record, {"matrices": record.provenance, "versions": record.versions}, rigid=asdict(record.rigid))
 
 
 def figure(record: CalibrationRecord) -> go.Figure:

@@ -28,7 +28,8 @@ def load(path: Path) -> Result:
     provenance = {
         "matrices": json.loads(attributes["provenance"]), "versions": json.loads(attributes.get("versions", "{}"))
     }  # fmt: skip
-    return Result((values, attributes), provenance)
+    rigid = {"damping_ratio": float(attributes["damping_ratio"])} | json.loads(attributes.get("rigid", "{}"))
+    return Result((values, attributes), provenance, rigid=rigid)
 
 
 def figure(record: Modes | tuple[dict[str, Any], dict[str, Any]]) -> go.Figure:

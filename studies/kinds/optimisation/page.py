@@ -31,6 +31,7 @@ def shown(file: str, record: Optimisation, page: Page) -> dict[str, Any]:
         drawn = dressed(along_figure(record), height=120 + 260 * len(record.along))
         charts.append(page.chart("optimum", drawn, ("number", "value", "relative_amplitude"), points, [file]))
     return {
+        "file": file,
         "record": record,
         "numbers": {path: unit_of(path) for path, _ in record.nominal.design.numbers},
         "tolerances": [name for name, _ in record.robust.estimate.get("by") or record.nominal.estimate.get("by", ())],

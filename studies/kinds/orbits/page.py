@@ -64,7 +64,7 @@ def _group(records: Mapping[str, Branches], page: Page) -> dict[str, Any]:
     branches, files = joined(list(records.values())), list(records)
     beside = sweeps_beside(branches.scene, branches.parameter, page.results.kinds["sweep"])
     figure = branches_figure(branches, {page.names[file]: points for file, points in beside.items()})
-    shown: dict[str, Any] = {"record": branches, "units": unit_of(branches.parameter), "orbits": None}
+    shown: dict[str, Any] = {"file": files[0], "record": branches, "units": unit_of(branches.parameter), "orbits": None}
     shown["quantities"] = _ranges(branches)
     shown["rows"] = [_row(branches, number) for number in range(len(branches.branches))]
     shown["chart"] = page.chart("branches", figure, *_branches_table(branches), [*files, *beside])

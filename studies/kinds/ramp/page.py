@@ -39,6 +39,7 @@ def shown(file: str, ramp: Ramp, page: Page) -> dict[str, Any]:
     ]
     chosen = menu(ramp)
     return {
+        "file": file,
         "record": ramp,
         "along": along(ramp),
         "rows": rows,

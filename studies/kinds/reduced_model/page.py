@@ -65,12 +65,11 @@ def shown(file: str, model: ReducedModel, page: Page) -> dict[str, Any]:
 
 
 def _picture(file: str, model: ReducedModel, spots: Mapping[str, Mapping[str, Any]], page: Page) -> Chart | None:
-    """Return the hot spots on the mesh of the page's modes, with their first bending's stress; None without."""
-    mesh = model.provenance.get("matrices", {}).get("mesh_sha256")
+    """Return the hot spots on the mesh of the same model's modes, with their first bending's stress; None without."""
     for modes, result in page.results.kinds["modes"].items():
         values, attributes = result.record
-        same_mesh = result.provenance is not None and result.provenance["matrices"].get("mesh_sha256") == mesh
-        surface = small_surface(values) if same_mesh and "von_mises" in values else None
+        one_model = modes in page.origins.group(file)
+        surface = small_surface(values) if one_model and "von_mises" in values else None
         if surface is not None:
             figure = spots_figure(values, surface, int(attributes["first_bending"]), spots)
             return page.chart("spots", figure, ("x", "y", "z", "stress"), spots_rows(values, surface), [file, modes])

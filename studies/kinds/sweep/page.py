@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from vanedamp.studies.kinds.sweep.bifurcations import (
 )
 from vanedamp.studies.report.charts import Chart
 from vanedamp.studies.report.designs import best_first
-from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, linear_curves, model_name
+from vanedamp.studies.report.forced_response import ForcedResponse, forced_responses, linear_curves
 from vanedamp.studies.report.forced_response_charts import (
     bodies_in_plane,
     cycle,
@@ -41,7 +40,6 @@ from vanedamp.studies.report.map_chart import (
     basins_figure,
     count_axes,
     count_figure,
-    has_responses,
     map_axes,
     map_figure,
     map_panels,
@@ -70,7 +68,7 @@ def section(results: Mapping[str, Result], page: Page) -> dict[str, Any]:
     """Return groups of responses along a common axis, maps, basins, and remarks about the bodies."""
     sweeps = {file: result.record for file, result in results.items()}
     return {
-        "groups": [_group(group, sweeps, page) for group in _by_axis(_responses(sweeps, page))],
+        "groups": [_group(group, sweeps, page) for group in _by_axis(page.responses(sweeps))],
         "maps": [_map(file, sweep, page) for file, sweep in sweeps.items() if map_axes(sweep)],
         "diagrams": [_diagram(file, sweep, page) for file, sweep in sweeps.items() if diagram_axis(sweep)],
         "ends": [_ends(file, sweep, page) for file, sweep in sweeps.items() if basin_axes(sweep) or count_axes(sweep)],
@@ -93,21 +91,6 @@ def _body_note(sweep: Sweep) -> str | None:
     return body_note(sweep.provenance, sweep.scene)
 
 
-def _responses(sweeps: Mapping[str, Sweep], page: Page) -> list[ForcedResponse]:
-    """Return the curves of sweeps; curves of a study are named after their files, others after their models."""
-    sweeps = {file: sweep for file, sweep in sweeps.items() if has_responses(sweep)}
-    models = [model_name(sweep.scene) for sweep in sweeps.values()]
-    responses = []
-    for model, (file, sweep) in zip(models, sweeps.items(), strict=True):
-        stem = page.names[file].removesuffix(".h5")
-        if page.study is not None:
-            name = stem.removeprefix(page.study).strip("_").replace("_", " ") or model
-        else:
-            name = model if models.count(model) == 1 else f"{model} ({stem})"
-        responses += [replace(response, source=file) for response in forced_responses(sweep, name)]
-    return responses
-
-
 def _by_axis(responses: Sequence[ForcedResponse]) -> list[list[ForcedResponse]]:
     """Group the responses of a common chart: along the same axis."""
     axes = dict.fromkeys(response.axis for response in responses)
@@ -120,6 +103,7 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
     positions = {response.name: position for position, response in enumerate(responses)}
     if page.study is None:
         responses = best_first(responses)[:_MOST_CURVES]
+    responses = page.coloured(responses)
     shown = [response.name for response in responses[: every if page.study is not None else _DRAWN]]
     linear = [linear_curves(sweeps[response.source], response) for response in responses]
     panels = [response for response in responses if np.isfinite(response.energy_share).any()]
@@ -142,7 +126,7 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
             "impacts": max(response.impacts_per_period[np.isfinite(response.damped_mean)], default=math.nan),
             "place": positions[response.name],
         }
-        for response, colour in zip(responses, cycle(len(responses)), strict=True)
+        for response, colour in zip(responses, cycle(responses), strict=True)
     ]  # fmt: skip
     return charts | {
         "axis": axis, "units": responses[0].units, "onset_of": max((curve.onset_of for curve in responses), key=len),

@@ -32,6 +32,7 @@ from vanedamp.studies.report.page import body_note, write_report
 from vanedamp.studies.report.results import collect
 
 FREQUENCIES = (np.linspace(0.97, 1.02, 7) * RESONANCE).tolist()
+ONE, TWO = (f"rigid model (sweep_{name}), frequency = 15.9155 Hz" for name in ("one", "two"))
 
 
 @pytest.fixture(scope="module")
@@ -98,9 +99,9 @@ def test_curves_are_in_the_page(page, results):
     assert set(found) == expected
     one, two = (Sweep.load(results / f"sweep_{name}.h5") for name in ("one", "two"))
     expected = {
-        "rigid model (sweep_one)": (one, ()),
-        "rigid model (sweep_two), c1.gap = 200 µm": (two, (0,)),
-        "rigid model (sweep_two), c1.gap = 400 µm": (two, (1,)),
+        f"{ONE}, c1.gap = 200 µm": (one, ()),
+        f"{TWO}, c1.gap = 200 µm": (two, (0,)),
+        f"{TWO}, c1.gap = 400 µm": (two, (1,)),
     }
     traces = found["response-0"]
     assert names_of(traces) == set(expected)
@@ -119,7 +120,7 @@ def test_curves_are_in_the_page(page, results):
         # between the points as well: the peak itself is there
         assert trace["y"].max() == pytest.approx(float(one.peaks[f"{measure.split('_')[1]}_peak"]) / 1e-3, rel=1e-3)
         assert len(trace["x"]) > 20 * len(FREQUENCIES)
-    attached = next(t for t in found["mistuning-0"] if t["meta"]["curves"] == ["rigid model (sweep_one)"])
+    attached = next(t for t in found["mistuning-0"] if t["meta"]["curves"] == [f"{ONE}, c1.gap = 200 µm"])
     np.testing.assert_allclose(attached["y"], one.attached_mass_fraction)
     shares = [t for t in found["energy-0"] if t["stackgroup"] == "0-0"]
     np.testing.assert_allclose(np.sum([t["y"] for t in shares], axis=0), 100.0)
@@ -162,7 +163,7 @@ def test_every_chart_has_its_data_and_their_provenance(page, results):
     assert set(links) == set(charts(page)) | {"motion-0"}
     table = list(csv.DictReader(io.StringIO(base64.b64decode(links["response-0"]).decode())))
     record = Sweep.load(results / "sweep_one.h5")
-    mine = [row for row in table if row["response"] == "rigid model (sweep_one)"]
+    mine = [row for row in table if row["response"] == f"{ONE}, c1.gap = 200 µm"]
     np.testing.assert_array_equal([float(row["damped_mean"]) for row in mine], record.amplitude_mean)
     np.testing.assert_array_equal([float(row["excitation.frequency"]) for row in mine], FREQUENCIES)
     for anchor in re.findall(r'href="#([\w-]+)"', page):
@@ -259,7 +260,7 @@ def test_page_fetches_nothing(page):
 def test_tables_hold_the_results(page, results):
     for frequency in ReducedModel.load(results / "rom.h5").natural_frequencies_hz:
         assert f"{frequency:.2f}" in page
-    for text in ("effective masses", "rigid model", "mesh_sha256", "damper[0].restitution"):
+    for text in ("effective masses", "rigid model", "mesh_sha256", "damper.0.restitution"):
         assert text.lower() in page.lower()
 
 
@@ -421,12 +422,12 @@ def test_scenes_say_what_they_share_and_what_is_their_own(results, tmp_path):
         )
     for files, told in (
         (2, "<th>case0.h5</th><th>case1.h5</th>"),
-        (6, "<td>case5.h5</td><td><code>damper[0].friction</code> = 0.5</td>"),
+        (6, "<td>case5.h5</td><td><code>damper.0.friction</code> = 0.5</td>"),
     ):
         write_report(collect([tmp_path / f"case{number}.h5" for number in range(files)]), tmp_path / "report.html")
         page = (tmp_path / "report.html").read_text(encoding="utf-8")
         assert told in page
-        assert page.count("<td><code>damper[0].restitution</code></td><td>0.6</td>") == 1
+        assert page.count("<td><code>damper.0.restitution</code></td><td>0.6</td>") == 1
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
