@@ -84,8 +84,6 @@ class Devices:
         stiffness = contact_stiffness(self._model, self.cavities, resonance, envelope.mass[1] / envelope.bodies[0])
         compliant = {"law": "compliant", "stiffness": stiffness}
         self._data["contact"] = compliant if study.contact is None else plain(tables(study.contact))
-        if study.wear is not None:
-            self._data["wear"] = plain(tables(study.wear))
         self.frequencies = self._band()
         self._data["excitation"]["frequency"] = float(self.frequencies[0])
         scene = self.at(middle, LEVELS[0])
@@ -102,7 +100,8 @@ class Devices:
     def _check(self, device: Device, level: int | None) -> None:
         """Raise InputError, naming the study, for a device that its model or its cavities do not take."""
         try:
-            assemble(self.at(device, level))
+            scene = self.at(device, level)
+            assemble(scene if self.study.wear is None else scene.replace({"wear": plain(tables(self.study.wear))}))
         except InputError as error:
             raise InputError(f"{self.source}: envelope: {error}") from None
 
@@ -209,7 +208,6 @@ class Devices:
         if "base_acceleration" in excitation:  # of a search the level that gives the same resonance
             excitation = {key: value for key, value in excitation.items() if not key.startswith("base_")}
             data["excitation"] = excitation | {"resonance_amplitude": self.amplitude}
-        data.pop("wear", None)
         halves: dict[str, Any] = {UNCERTAIN[name]: (high - low) / 2 for name, (low, high) in self.uncertain.items()}
         halves["cavity.gap"] = envelope.gap_tolerance
         halves["damper.mass"] = {"relative": envelope.mass_tolerance}
@@ -226,7 +224,9 @@ class Devices:
     def life(self, device: Device, level: int | None, keeps: float) -> dict[str, Any]:
         """Return the tables of the study of a device's life; keeps: reduction that must remain."""
         stress = self.study.effort.hot_spots > 0  # of the whole model
+        assert self.study.wear is not None
         return self.tables(device, None if stress else level, stress) | {
+            "wear": plain(tables(self.study.wear)),
             "life": {
                 "hours": self.study.hours, "band": self.frequencies.tolist(), "dwell": self.dwell.tolist(),
                 "measure": "amplitude_max", "threshold": keeps, "tolerance": 0.05, "reach": 0.3,

@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 from vanedamp.coupling.quantities.amplitude import amplitude_max_dynamic
-from vanedamp.coupling.quantities.stress import damage_per_hour, utilisation, von_mises
+from vanedamp.coupling.quantities.stress import damage_per_hour, utilisation_max
 from vanedamp.files.store import finite
 from vanedamp.studies.design.tables import DesignFile
-from vanedamp.studies.design.worst import Confirmation
+from vanedamp.studies.design.worst import STRESS_MAX, Confirmation
 from vanedamp.studies.hot_spots import DOUBTFUL
 from vanedamp.studies.life.record import LifeRecord
 
@@ -116,15 +116,15 @@ def _amplitudes(study: DesignFile, worst: Confirmation) -> Iterator[HeldValue]:
 
 def _stresses(study: DesignFile, worst: Confirmation, spots: Mapping[str, SpotFacts]) -> Iterator[HeldValue]:
     names = {
-        von_mises.name: ("stress amplitude", None),
-        utilisation.name: ("utilisation", study.requirements.utilisation),
+        STRESS_MAX: ("largest stress", None),
+        utilisation_max.name: ("utilisation", study.requirements.utilisation),
     }
     for quantity, (name, limit) in names.items():
         for spot, values in worst.spots.items():
             if quantity in values:
                 value, error = values[quantity], spots[spot].error or 0.0
                 high = value * (1.0 + error) * (1.0 + _rise(worst))
-                unit = "Pa" if quantity == von_mises.name else "1"
+                unit = "Pa" if quantity == STRESS_MAX else "1"
                 yield HeldValue(
                     f"{name} at {spot}", unit, value, max(value * (1.0 - error), 0.0), finite(high),
                     f"mesh {_percent(spots[spot].error)}, draws, starts and modes {_percent(_rise(worst))}",

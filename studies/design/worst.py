@@ -1,7 +1,8 @@
 """The worst of a device: over draws of what is uncertain of it, over its band, and over starts.
 
-Every draw runs over the band from rest, going up and going down; further runs have random starts, draws and
-frequencies. What draws have missed is estimated by the spacing of the largest amplitudes of the random runs.
+Every draw runs over the band from rest, going up and going down, the worst one again with frequencies that differ by
+millionths, since irregular motions never repeat; further runs have random starts, draws and frequencies. What was
+missed is estimated by the spacing of the largest amplitudes of each of these.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from vanedamp.coupling.quantities.amplitude import amplitude_max_dynamic, amplitude_mean
-from vanedamp.coupling.quantities.stress import damage_per_hour, utilisation, von_mises
+from vanedamp.coupling.quantities.stress import damage_per_hour, utilisation_max, von_mises
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.sweep.designs import UNSURE
 from vanedamp.coupling.sweep.sweep import run_list, sweep
@@ -30,11 +31,16 @@ from vanedamp.studies.worst_start import STARTS
 #: with a probability of 95 % if the density of amplitudes is finite up to their end (Renyi's representation)
 _LARGEST, _SPACINGS = 10, 3.0
 #: draws by which the devices of a search are compared from all starts
-_SCREENED = 4
+SCREENED = 4
 #: points by which the band is refined at its worst point
 _REFINED = 9
+#: repetitions of the worst draw, and by what fraction the frequencies of the next one are higher
+_REPEATS, _HIGHER = 8, 1e-6
+#: most numbers whose corners are counted
+_COUNTED = 16
 #: quantities of hot spots that are kept
-OF_SPOTS = (von_mises.name, utilisation.name, damage_per_hour.name)
+STRESS_MAX = f"{von_mises.name}_max"
+OF_SPOTS = (STRESS_MAX, utilisation_max.name, damage_per_hour.name)
 
 _Draws = Annotated[np.ndarray, Array(("draw", "number"))]
 
@@ -68,6 +74,8 @@ class Confirmation(Record):
     """largest amplitude of each draw; nan where all of its runs failed"""
     of_starts: Annotated[np.ndarray, Array(("start",), "m")]
     """amplitudes of the runs with random starts; nan where a run failed"""
+    of_repeats: Annotated[np.ndarray, Array(("repeat",), "m")]
+    """largest amplitudes of the worst draw, again and again"""
     amplitude: float
     """largest amplitude [m]"""
     missed: float
@@ -129,11 +137,15 @@ class Confirmation(Record):
 def drawn(ranges: Mapping[str, tuple[float, float]], count: int, seed: int) -> np.ndarray:
     """Return draws (count, p) from ranges: half of them a Latin hypercube, half of them random corners.
 
-    The largest amplitude is often at a corner, which a hypercube does not reach.
+    The largest amplitude is often at a corner, which a hypercube does not reach. No corner is drawn twice.
     """
     low, high = np.transpose(list(ranges.values()))
     unit = qmc.LatinHypercube(len(ranges), seed=seed).random(count)
-    unit[1::2] = np.round(unit[1::2])
+    bits = min(len(ranges), _COUNTED)
+    corners = np.random.default_rng(seed).permutation(2**bits)[: count // 2]
+    for place, corner in zip(range(1, count, 2), corners.tolist(), strict=False):
+        unit[place] = np.round(unit[place])
+        unit[place, :bits] = [corner >> bit & 1 for bit in range(bits)]
     return np.asarray(low + unit * (high - low))
 
 
@@ -224,13 +236,18 @@ class _Runs:
         return heights
 
 
+def runs_to_confirm(devices: Devices) -> int:
+    """Return the number of runs over the band by which a device is confirmed."""
+    return 3 * len(devices.frequencies) * (devices.study.effort.draws + _REPEATS)
+
+
 def confirm(
     devices: Devices, device: Device, executor: Executor | None, progress: Callable[[int, int], None],
     provenance: Mapping[str, Any],
 ) -> Confirmation:  # fmt: skip
     """Run a device over what is uncertain of it, on the cheapest level that agrees with the whole reduced model."""
     effort, band = devices.study.effort, devices.frequencies
-    total = 3 * len(band) * (effort.draws + len(LEVELS) + 1) + effort.starts + 2 * 3 * _REFINED
+    total = 3 * len(band) * (effort.draws + len(LEVELS) + 1 + _REPEATS) + effort.starts + 2 * 3 * _REFINED
     runs = _Runs(devices, device, executor, lambda done: progress(done, max(done, total)))
     paths = list(runs.ranges)
     draws = drawn(runs.ranges, effort.draws, effort.seed) if paths else np.empty((1, 0))
@@ -250,13 +267,16 @@ def confirm(
             f"of `vanedamp run` of its scene at {band[0]:.6g} Hz"
         )
     _refine(runs, level, band)
+    worst = {path: runs.at[path] for path in paths}
+    of_repeats = np.array([runs.draw(level, worst, band * (1.0 + _HIGHER * k)) for k in range(1, _REPEATS + 1)])
     linear = linear_amplitudes(devices.at(device, level), band)
     numbers = {path: runs.at[path] for path in paths}
     spots, spot_scene = _spots(runs, numbers, whole if numbers == worst_row else None)
     return Confirmation(
         device=device._asdict(), level=level, levels=levels, frequency=band, undamped=linear[0], fixed=linear[1],
         worst=runs.curve, reference=devices.amplitude, numbers=tuple(paths), draws=draws, of_draws=of_draws,
-        of_starts=of_starts, amplitude=runs.amplitude, missed=_missed(of_starts), at=runs.at, worst_scene=runs.scene,
+        of_starts=of_starts, of_repeats=of_repeats, amplitude=runs.amplitude,
+        missed=max(map(_missed, (of_starts, of_draws, of_repeats))), at=runs.at, worst_scene=runs.scene,
         spots=spots, spot_scene=spot_scene, runs=runs.done, failed=runs.failed, unsure=runs.unsure,
         provenance=dict(provenance),
     )  # fmt: skip
@@ -272,13 +292,13 @@ def screened(
     above what another one reaches from all starts, since further starts only add to it.
     """
     best, least, done = candidates[0][0], np.inf, 0
-    total = 3 * len(devices.frequencies) * _SCREENED * len(candidates)
+    total = 3 * len(devices.frequencies) * SCREENED * len(candidates)
     for device, known in sorted(candidates, key=lambda candidate: candidate[1]):
         if known >= least:
             break
         runs = _Runs(devices, device, executor, lambda more, before=done: progress(before + more, total))  # type: ignore[misc]
         largest = known
-        for row in drawn(runs.ranges, _SCREENED, devices.study.effort.seed).tolist() if runs.ranges else [[]]:
+        for row in drawn(runs.ranges, SCREENED, devices.study.effort.seed).tolist() if runs.ranges else [[]]:
             largest = np.maximum(
                 largest, runs.draw(LEVELS[0], dict(zip(runs.ranges, row, strict=True)), devices.frequencies)
             )
@@ -317,7 +337,7 @@ def _refine(runs: _Runs, level: int | None, band: np.ndarray) -> None:
 
 
 def _missed(amplitudes: np.ndarray) -> float:
-    """Return by how much further runs may exceed the largest of random ones, m."""
+    """Return by how much further runs may exceed the largest of some, m."""
     known = np.sort(amplitudes[np.isfinite(amplitudes)])[::-1]
     count = min(_LARGEST, len(known) - 1)
     return float(_SPACINGS * (known[0] - known[count]) / count) if count > 0 else float("inf")

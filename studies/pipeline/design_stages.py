@@ -23,7 +23,7 @@ from vanedamp.studies.design.record import DesignRecord, measurement, sentence_o
 from vanedamp.studies.design.scenes import LEVELS, PLAIN, Device, Devices, plain_model, words_of
 from vanedamp.studies.design.tables import DesignFile
 from vanedamp.studies.design.verdict import GREEN, LIFE, SPOTS, WORST, SpotFacts, held, overall
-from vanedamp.studies.design.worst import Confirmation, confirm, screened
+from vanedamp.studies.design.worst import SCREENED, Confirmation, confirm, runs_to_confirm, screened
 from vanedamp.studies.file_kinds import KINDS
 from vanedamp.studies.life.record import LifeRecord
 from vanedamp.studies.optimisation.record import Optimisation
@@ -51,6 +51,8 @@ from vanedamp.studies.terminal import duration, progress
 
 #: results in the folder of the study
 DESIGN, PAGE = "design.h5", "design.html"
+#: designs of a search that are compared from all starts until a better one is not expected
+_SCREENED = 3
 #: amplitudes that are told apart, relative to the smaller one: of others the device with fewer bodies is chosen
 _SAME = 0.02
 
@@ -75,7 +77,7 @@ class DesignStage(Stage):
 
     study: DesignFile
     rom: Path
-    KEYS: ClassVar[Sequence[str] | None] = ("envelope", "operation", "contact", "wear", "effort")
+    KEYS: ClassVar[Sequence[str] | None] = ("envelope", "operation", "contact", "effort")
 
     def check(self, workers: int) -> Iterable[str | Path]:
         """Return the study's file."""
@@ -105,7 +107,7 @@ class Searches(DesignStage):
         band, effort = devices.frequencies, self.study.effort
         tools.note(
             f"{band[0]:.5g} to {band[-1]:.5g} Hz in {len(band)} steps; {devices.amplitude:.4g} m without bodies; "
-            f"the rest takes about {duration(estimated(devices) / getattr(tools.pool(), '_max_workers', 1))}"
+            f"the rest takes about {duration(estimated(devices) / tools.workers)}"
         )
         return f"{len(self.outputs)} searches of {effort.evaluations} designs"
 
@@ -207,7 +209,8 @@ def estimated(devices: Devices) -> float:
         searched = effort.evaluations * (2 + effort.samples) + 10
         # most often a level between these decides
         confirmed = math.sqrt(cheap * mean_cost([devices.at(device, None)]))
-        total += points * (cheap * searched + stressed * 3) + confirmed * (points * 3 * effort.draws + effort.starts)
+        total += points * (cheap * searched + stressed * 3) + confirmed * (runs_to_confirm(devices) + effort.starts)
+        total += cheap * 3 * points * SCREENED * _SCREENED
         if devices.study.wear is not None and bodies == envelope.bodies[0]:
             total += stressed * 12 * points
     return total
@@ -300,6 +303,8 @@ def _neglected(study: DesignFile, best: Confirmation, life: LifeRecord | None) -
         yield "bodies tilt and lift (give length and height of a body)"
     if life is None:
         yield "wear of the damper (give a [wear] table)"
+    if best.at["frequency"] in best.frequency[[0, -1]]:
+        yield "frequencies beyond the band, at whose end the largest amplitude lies"
     yield "differences between the vanes of a ring"
     yield "temperature of the bodies, lubrication, dirt in the cavity"
 

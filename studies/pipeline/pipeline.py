@@ -87,7 +87,8 @@ def run_stages(
     started, say = time.perf_counter(), note or (lambda line: None)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{source}: folder: {folder} is a file; name a folder for the results")
-    _check(listed, [source, *files], source, workers or available_cores())
+    count = workers or available_cores()
+    _check(listed, [source, *files], source, count)
     record = PipelineRecord(folder / f"{source.stem}.record.json")
     _keep_edited(listed, record)
     if dry_run:
@@ -98,7 +99,7 @@ def run_stages(
         pool = cache(lambda: stack.enter_context(worker_processes(workers)))
         for stage in listed:
             with _located(stage):
-                results.append(_done(stage, record, say, pool))
+                results.append(_done(stage, record, say, pool, count))
     result = PipelineResult(tuple(results), time.perf_counter() - started)
     say(f"{source}: {len(result.done)} of {len(listed)} stages ran, {result.wall_time_s:.1f} s")
     return result
@@ -115,7 +116,7 @@ def adopt(path: str | Path) -> None:
 
 
 def _done(
-    stage: Stage, record: PipelineRecord, say: Callable[[str], None], pool: Callable[[], Executor | None]
+    stage: Stage, record: PipelineRecord, say: Callable[[str], None], pool: Callable[[], Executor | None], workers: int
 ) -> StageResult:
     """Run a stage unless its results match its inputs."""
     outputs, inputs = tuple(map(_shown, stage.outputs)), stage.inputs()
@@ -126,7 +127,8 @@ def _done(
     say(f"{stage.name}: runs, {'; '.join(reasons)}")
     same = record.begin(stage.name, inputs)
     started = time.perf_counter()
-    tools = Tools(lambda line: say(f"{stage.name}: {line}"), pool, not same, record.inputs(stage.name, stage.outputs))
+    made_of = record.inputs(stage.name, stage.outputs)
+    tools = Tools(lambda line: say(f"{stage.name}: {line}"), pool, workers, not same, made_of)
     words = stage.work(tools)
     seconds = time.perf_counter() - started
     record.end(stage.name, inputs, stage.outputs)

@@ -58,13 +58,14 @@ _DOLFINX = ("fenics-dolfinx", "dolfinx-solver-real")
 class Tools:
     """The inputs of a stage's work.
 
-    note: prints a line with the stage's name; pool: returns the worker processes, started when
-    first used; fresh: files of an earlier start belong to other inputs; made_of: the inputs of existing outputs,
-    if these are unchanged.
+    note: prints a line with the stage's name; pool: returns the worker processes, started when first used; workers:
+    their number; fresh: files of an earlier start belong to other inputs; made_of: the inputs of existing outputs, if
+    these are unchanged.
     """
 
     note: Callable[[str], None]
     pool: Callable[[], Executor | None]
+    workers: int = 1
     fresh: bool = False
     made_of: Inputs | None = None
 
