@@ -386,7 +386,7 @@ class Report(Stage):
 
         files = [path for path in (*self.takes, *self.results) if path.exists()]
         write_report(collect(files), self.outputs[0], self.title)
-        return f"{len(files)} results on {self.outputs[0].name}"
+        return f"{len(files)} result{'s' * (len(files) != 1)} on {self.outputs[0].name}"
 
 
 def _without_level(inputs: Inputs, strengths: bool = False) -> dict[str, Any]:
