@@ -19,6 +19,7 @@ from pydantic.json_schema import SkipJsonSchema
 from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, spread
 from vanedamp.coupling.scene.contact_laws.newton import Newton
 from vanedamp.coupling.scene.elements.element import SceneElement
+from vanedamp.coupling.scene.elements.joint import Joint
 from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.mistuning import DEVIATIONS
@@ -160,6 +161,8 @@ class Scene(OpenRecord, Displayed):
     """friction dampers between structure and casing"""
     stop: tuple[Stop, ...] = ()
     """stops that the structure hits"""
+    joint: tuple[Joint, ...] = ()
+    """friction between parts of the structure under a varying normal force"""
     initial: Initial = field(default_factory=Initial)
     """state of a rigid structure at time zero (default: at rest)"""
     gravity: Gravity = field(default_factory=Gravity)
@@ -281,7 +284,7 @@ class Scene(OpenRecord, Displayed):
     @property
     def element_tables(self) -> dict[str, tuple[SceneElement, ...]]:
         """The lists of tables of elements by their names."""
-        return {"stop": self.stop} | (self.added or {})
+        return {"stop": self.stop, "joint": self.joint} | (self.added or {})
 
     @property
     def repeats(self) -> bool:
@@ -476,7 +479,7 @@ class Scene(OpenRecord, Displayed):
         """Raise ValueError for contacts with rates of their own that the scene has not."""
         counts = {"casing": len(self.friction_damper)} | {name: len(of) for name, of in self.element_tables.items()}
         for number, pair in enumerate(() if self.wear is None else self.wear.pair):
-            owners = {"casing": "friction dampers", "stop": "stops"}.get(pair.side or "", "bodies")
+            owners = {"casing": "friction dampers", "stop": "stops", "joint": "joints"}.get(pair.side or "", "bodies")
             count = counts.get(pair.side or "", len(self.damper))
             if pair.side is None:
                 count = max(count, *counts.values())

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -501,7 +502,7 @@ def test_the_report_of_a_motion_with_few_turning_points_or_none(tmp_path):
         assert json.dumps(again.to_json()) == json.dumps(found.to_json())
         assert len(found.time) < 4
     write_report(collect([tmp_path]), tmp_path / "report.html")
-    assert (tmp_path / "report.html").read_text().count(">Ring-down</h2>") == 3
+    assert len(re.findall(r">Ring-down[^<]*</h2>", (tmp_path / "report.html").read_text())) == 3
 
 
 @pytest.mark.parametrize(
