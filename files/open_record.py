@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import GetJsonSchemaHandler, TypeAdapter, model_serializer, model_validator
 from pydantic.dataclasses import dataclass
+from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import ArgsKwargs, CoreSchema, SchemaValidator, core_schema
 
@@ -63,7 +64,10 @@ class OpenRecord:
         json_schema = handler(schema)
         properties = handler.resolve_ref_schema(json_schema)["properties"]
         del properties["added"]
-        properties |= {key: handler(_schema(kind)) for key, kind in cls.keys_added().items()}
+        for key, kind in cls.keys_added().items():
+            told = (one for one in getattr(kind, "__metadata__", ()) if isinstance(one, FieldInfo))
+            about = next((one.description for one in told), None)
+            properties[key] = handler(_schema(kind)) | ({} if about is None else {"description": about})
         return json_schema
 
 

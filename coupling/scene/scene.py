@@ -19,7 +19,6 @@ from pydantic.json_schema import SkipJsonSchema
 from vanedamp.coupling.scene.bodies import Cavity, Damper, FrictionDamper, spread
 from vanedamp.coupling.scene.contact_laws.newton import Newton
 from vanedamp.coupling.scene.elements.element import SceneElement
-from vanedamp.coupling.scene.elements.joint import Joint
 from vanedamp.coupling.scene.elements.stop import Stop
 from vanedamp.coupling.scene.excitation import Excitation, Gravity
 from vanedamp.coupling.scene.mistuning import DEVIATIONS
@@ -161,8 +160,6 @@ class Scene(OpenRecord, Displayed):
     """friction dampers between structure and casing"""
     stop: tuple[Stop, ...] = ()
     """stops that the structure hits"""
-    joint: tuple[Joint, ...] = ()
-    """friction between parts of the structure under a varying normal force"""
     initial: Initial = field(default_factory=Initial)
     """state of a rigid structure at time zero (default: at rest)"""
     gravity: Gravity = field(default_factory=Gravity)
@@ -284,7 +281,7 @@ class Scene(OpenRecord, Displayed):
     @property
     def element_tables(self) -> dict[str, tuple[SceneElement, ...]]:
         """The lists of tables of elements by their names."""
-        return {"stop": self.stop, "joint": self.joint} | (self.added or {})
+        return {"stop": self.stop} | (self.added or {})
 
     @property
     def repeats(self) -> bool:
@@ -325,7 +322,12 @@ class Scene(OpenRecord, Displayed):
     def keys_added(cls) -> Mapping[str, Any]:
         """Return the tables of elements that are no fields."""
         names = [name for name in ELEMENTS.names() if name not in cls.__dataclass_fields__]
-        return {name: tuple.__class_getitem__((ELEMENTS.part(name), ...)) for name in names}
+        parts = {name: ELEMENTS.part(name) for name in names}
+        about = {name: (part.__doc__ or name).partition("\n")[0].rstrip(".") for name, part in parts.items()}
+        return {
+            name: Annotated[tuple.__class_getitem__((part, ...)), Field(description=about[name])]
+            for name, part in parts.items()
+        }
 
     def _check_plane(self) -> None:
         """Raise ValueError where a scene with planar bodies lacks or has something that they cannot do with."""

@@ -59,12 +59,11 @@ def unrolled(scene: Scene) -> Scene:
     copies = {"casing": _places(dampers), "": _places(bodies)}
     copies |= {table: _places(entries) for table, entries in elements.items()}
     written: dict[str, Any] = {table: tuple(entry for _, entry in entries) for table, entries in elements.items()}
-    added = {table: written.pop(table) for table in scene.added or {}}
     wear = scene.wear and replace(scene.wear, pair=tuple(_pairs(scene.wear.pair, copies)))
     return replace(
         scene, excitation=_excitation(scene.excitation, ring), cavity=cavities,
         damper=tuple(body for _, body in bodies), friction_damper=tuple(damper for _, damper in dampers),
-        added=added or None, wear=wear, ranges={}, **written,
+        stop=written.pop("stop"), added=written or None, wear=wear, ranges={},
     )  # fmt: skip
 
 
