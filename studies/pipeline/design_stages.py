@@ -51,6 +51,10 @@ from vanedamp.studies.terminal import duration, progress
 
 #: results in the folder of the study
 DESIGN, PAGE = "design.h5", "design.html"
+#: frequencies of the band at which the cost of runs is tried
+_TRIED = 6
+#: sweeps over the band by which a life is followed
+_LIFE_STEPS = 30
 #: designs of a search that are compared from all starts until a better one is not expected
 _SCREENED = 3
 #: amplitudes that are told apart, relative to the smaller one: of others the device with fewer bodies is chosen
@@ -202,17 +206,20 @@ def estimated(devices: Devices) -> float:
     from vanedamp.studies.jobs.trial import mean_cost
 
     effort, points, total = devices.study.effort, len(devices.frequencies), 0.0
-    envelope = devices.study.envelope
+    envelope, over_band = devices.study.envelope, devices.frequencies[:: max(points // _TRIED, 1)].tolist()
     for bodies in envelope.bodies:
-        device = Device(bodies, sum(envelope.mass) / 2 / bodies, sum(envelope.gap) / 2)
-        cheap, stressed = (mean_cost([devices.at(device, level, level is None)]) for level in (LEVELS[0], None))
+        device = Device(bodies, sum(envelope.mass) / 2 / bodies, math.sqrt(math.prod(envelope.gap)))
+        scenes = {
+            key: [devices.at(device, *key).replace({"excitation.frequency": f}) for f in over_band]
+            for key in ((LEVELS[0], False), (None, False), (None, True))
+        }
+        # most often the whole model decides
+        cheap, confirmed, stressed = map(mean_cost, scenes.values())
         searched = effort.evaluations * (2 + effort.samples) + 10
-        # most often a level between these decides
-        confirmed = math.sqrt(cheap * mean_cost([devices.at(device, None)]))
         total += points * (cheap * searched + stressed * 3) + confirmed * (runs_to_confirm(devices) + effort.starts)
         total += cheap * 3 * points * SCREENED * _SCREENED
         if devices.study.wear is not None and bodies == envelope.bodies[0]:
-            total += stressed * 12 * points
+            total += stressed * _LIFE_STEPS * points
     return total
 
 
