@@ -7,6 +7,7 @@ missed is estimated by the spacing of the largest amplitudes of each of these.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -36,8 +37,6 @@ SCREENED = 4
 _REFINED = 9
 #: repetitions of the worst draw, and by what fraction the frequencies of the next one are higher
 _REPEATS, _HIGHER = 8, 1e-6
-#: most numbers whose corners are counted
-_COUNTED = 16
 #: quantities of hot spots that are kept
 STRESS_MAX = f"{von_mises.name}_max"
 OF_SPOTS = (STRESS_MAX, utilisation_max.name, damage_per_hour.name)
@@ -141,11 +140,9 @@ def drawn(ranges: Mapping[str, tuple[float, float]], count: int, seed: int) -> n
     """
     low, high = np.transpose(list(ranges.values()))
     unit = qmc.LatinHypercube(len(ranges), seed=seed).random(count)
-    bits = min(len(ranges), _COUNTED)
-    corners = np.random.default_rng(seed).permutation(2**bits)[: count // 2]
-    for place, corner in zip(range(1, count, 2), corners.tolist(), strict=False):
-        unit[place] = np.round(unit[place])
-        unit[place, :bits] = [corner >> bit & 1 for bit in range(bits)]
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(ranges))))
+    order = np.random.default_rng(seed).permutation(len(corners))[: count // 2]
+    unit[1 : 2 * len(order) : 2] = corners[order, ::-1]
     return np.asarray(low + unit * (high - low))
 
 
@@ -247,7 +244,7 @@ def confirm(
 ) -> Confirmation:  # fmt: skip
     """Run a device over what is uncertain of it, on the cheapest level that agrees with the whole reduced model."""
     effort, band = devices.study.effort, devices.frequencies
-    total = 3 * len(band) * (effort.draws + len(LEVELS) + 1 + _REPEATS) + effort.starts + 2 * 3 * _REFINED
+    total = runs_to_confirm(devices) + 3 * len(band) * (len(LEVELS) + 1) + effort.starts + 2 * 3 * _REFINED
     runs = _Runs(devices, device, executor, lambda done: progress(done, max(done, total)))
     paths = list(runs.ranges)
     draws = drawn(runs.ranges, effort.draws, effort.seed) if paths else np.empty((1, 0))
@@ -267,10 +264,9 @@ def confirm(
             f"of `vanedamp run` of its scene at {band[0]:.6g} Hz"
         )
     _refine(runs, level, band)
-    worst = {path: runs.at[path] for path in paths}
-    of_repeats = np.array([runs.draw(level, worst, band * (1.0 + _HIGHER * k)) for k in range(1, _REPEATS + 1)])
-    linear = linear_amplitudes(devices.at(device, level), band)
     numbers = {path: runs.at[path] for path in paths}
+    of_repeats = np.array([runs.draw(level, numbers, band * (1.0 + _HIGHER * k)) for k in range(1, _REPEATS + 1)])
+    linear = linear_amplitudes(devices.at(device, level), band)
     spots, spot_scene = _spots(runs, numbers, whole if numbers == worst_row else None)
     return Confirmation(
         device=device._asdict(), level=level, levels=levels, frequency=band, undamped=linear[0], fixed=linear[1],

@@ -310,7 +310,7 @@ def _neglected(study: DesignFile, best: Confirmation, life: LifeRecord | None) -
         yield "bodies tilt and lift (give length and height of a body)"
     if life is None:
         yield "wear of the damper (give a [wear] table)"
-    if best.at["frequency"] in best.frequency[[0, -1]]:
+    if not best.frequency[0] < best.at["frequency"] < best.frequency[-1]:
         yield "frequencies beyond the band, at whose end the largest amplitude lies"
     yield "differences between the vanes of a ring"
     yield "temperature of the bodies, lubrication, dirt in the cavity"
