@@ -44,6 +44,8 @@ class Joint(SceneElement):
     """distance across the joint at rest; not with a preload [m]"""
     normal_stiffness: Positive | None = None
     """stiffness across the joint (default: by the contact law) [N/m]"""
+    tangential_stiffness: Positive | None = None
+    """stiffness along the joint until it slips, unloaded at time zero; needs normal_stiffness (default: rigid) [N/m]"""
     restitution: Fraction = 0.0
     """coefficient of restitution, where the contact law takes one [-]"""
     sectors: Sectors | None = None
@@ -57,11 +59,18 @@ class Joint(SceneElement):
             raise ValueError(f'normal: expected "{_CASING}" in the same place as in between')
         if self.gap and (self.preload or self.preload_by_speed):
             raise ValueError("gap: a joint that is open at rest has no preload; give one of them")
+        if self.tangential_stiffness is not None and self.normal_stiffness is None:
+            raise ValueError("tangential_stiffness: needs normal_stiffness, of the same part; give both")
 
     @property
     def yields(self) -> bool:  # type: ignore[override]
         """Whether it has a spring of its own across."""
         return self.normal_stiffness is not None
+
+    @property
+    def sliders(self) -> int:
+        """Number of its units that have a spring along."""
+        return int(self.tangential_stiffness is not None and self.friction > 0.0)
 
     def labels(self) -> Mapping[str, str | None]:
         """Return the labels of its points, by key and place."""
@@ -111,5 +120,5 @@ class Joint(SceneElement):
             element = parts.contact(normal, self.restitution, *(one for one in self.normal if one != _CASING))
         yield Unit(
             normal, apart("between"), self.gap - load / element.stiffness, self.friction, element, 0.0, number,
-            closing=load,
+            closing=load, tangential=(self.tangential_stiffness or np.inf) if self.sliders else np.inf,
         )  # fmt: skip
