@@ -11,7 +11,7 @@ that move by u - theta y where the floor moves by u.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -228,8 +228,12 @@ class ElementParts(NamedTuple):
 
     def contact(self, normal: np.ndarray, restitution: float, *labels: str | None) -> Element:
         """Return the scene's contact of a row between points of the structure."""
-        yields = sum(self.law.basis.flexibility({label or self.label: 1.0}) for label in labels)
+        yields = sum(self.flexibility({label or self.label: 1.0}) for label in labels)
         return self.law.element(normal, restitution, yields)
+
+    def flexibility(self, shares: Mapping[str, float]) -> float:
+        """Return the residual flexibility of a weighted sum of interface labels, m/N."""
+        return self.law.basis.flexibility(shares)
 
     def travel(self, normal: np.ndarray) -> float:
         """Return how far a row of the structure moves, m, at least the smallest number."""

@@ -56,6 +56,9 @@ class Parts(Protocol):
     def contact(self, normal: np.ndarray, restitution: float, *labels: str | None) -> Element:
         """Return the scene's contact of a normal row, between points of the structure: how it rebounds or yields."""
 
+    def flexibility(self, shares: Mapping[str, float]) -> float:
+        """Return what the modes lack of the static flexibility of a weighted sum of interface labels, m/N."""
+
     def travel(self, normal: np.ndarray) -> float:
         """Return how far a row of the structure moves under the static loads and the initial motion, m."""
 
