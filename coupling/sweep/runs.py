@@ -50,7 +50,7 @@ class Runs:
 
     def __init__(self, base: Scene, paths: Iterable[str]) -> None:
         self._maker, self._paths = Points(base), without_starts(columned(base, paths))
-        self._common, self._whole = Common.of(self._maker), not Row(base).keeps
+        self._common, self._whole = Common.of(self._maker), Row(base).searches
 
     def scene(self, numbers: Mapping[str, float]) -> Scene | None:
         """Return the scene with numbers; None where they make none."""
