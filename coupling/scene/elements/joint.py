@@ -17,7 +17,8 @@ from vanedamp.files.toml_input import STRICT, Fraction, InputError, NonNegative,
 _Points = tuple[str, str]
 #: what does not move, in place of a label
 _CASING = "casing"
-_MISSING: _Points = ("", "")
+#: of points that a pair gives
+_MISSING: Any = None
 
 
 @dataclass(frozen=True, config=STRICT, kw_only=True)
@@ -56,7 +57,7 @@ class Joint(SceneElement):
 
     def __post_init__(self) -> None:
         if self.at is not None:
-            if self.between != _MISSING or self.normal != _MISSING:
+            if self.between is not _MISSING or self.normal is not _MISSING:
                 raise ValueError("at: a pair has both of between and normal; leave them out")
             name, mark, where = self.at.partition("@")
             sectors = "" if where[:1] in ("+", "-") else mark + where, mark + where
@@ -65,7 +66,7 @@ class Joint(SceneElement):
             object.__setattr__(self, "normal", (f"{first}_across{sectors[0]}", f"{second}_across{sectors[1]}"))
             object.__setattr__(self, "at", None)  # as if written out
         for key, points in (("between", self.between), ("normal", self.normal)):
-            if points == _MISSING:
+            if points is _MISSING:
                 raise ValueError(f"{key}: missing; name two points, or give `at`, a pair of the case")
         for key, points in (("between", self.between), ("normal", self.normal)):
             if points[0] == points[1]:
