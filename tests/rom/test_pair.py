@@ -18,6 +18,7 @@ from vanedamp.modal.matrices import Patch
 from vanedamp.modal.msh import session
 from vanedamp.rom.interface import Interface
 from vanedamp.rom.pair import pair_motions
+from vanedamp.studies.case.ring_stages import ring_reduction
 from vanedamp.studies.case.stages import assemble, interface, reduction
 
 CASE = """
@@ -264,3 +265,101 @@ def test_node_sets_need_a_normal(built):
     with pytest.raises(VanedampError, match="platform: a and b have no normal: they are node sets"):
         pair_motions(bare, "platform", ("a", "b"), ALONG)
     assert pair_motions(bare, "platform", ("a", "b"), ALONG, ACROSS)[1].direction == pytest.approx(ACROSS)
+
+
+RING = """
+[mesh]
+file = "sector.msh"
+degree = 1
+[material.default]
+young = 2.0e11
+poisson = 0.3
+density = 8000.0
+damping_ratio = 0.02
+[support]
+clamped = ["hub"]
+[ring]
+sectors = 6
+low = "low"
+high = "high"
+[interface.tip]
+facets = "tip"
+direction = [0, 0, 1]
+[interface.platform]
+kind = "pair"
+facets = ["side_high", "side_low"]
+next_sector = true
+direction = [0, 0, 1]
+"""
+
+
+def write_sector(path, gap=1e-3):
+    """A sixth of a ring with a blade whose sides leave a gap to the neighbours, relative to the width."""
+    sixth, ends = np.pi / 3, np.array([[1.0, 0.0], [0.5, np.sin(np.pi / 3)]])
+    with session("sector"):
+        groups, volumes = {}, []
+        for inner, outer, shift in ((1.0, 1.5, 0.0), (1.5, 2.0, gap)):
+            sides = np.array([[1 - shift, shift], [shift, 1 - shift]]) @ ends
+            corners = [inner * sides[0], outer * sides[0], outer * sides[1], inner * sides[1]]
+            points = [gmsh.model.occ.addPoint(*corner, 0) for corner in corners]
+            lines = [gmsh.model.occ.addLine(points[k], points[(k + 1) % 4]) for k in range(4)]
+            surface = gmsh.model.occ.addPlaneSurface([gmsh.model.occ.addCurveLoop(lines)])
+            volumes += [one for one in gmsh.model.occ.extrude([(2, surface)], 0, 0, 0.5) if one[0] == 3]
+        gmsh.model.occ.fragment(volumes[:1], volumes[1:])
+        gmsh.model.occ.synchronize()
+        for _, tag in gmsh.model.getEntities(2):
+            x, y, z = gmsh.model.occ.getCenterOfMass(2, tag)
+            radius, angle, middle = np.hypot(x, y), np.arctan2(y, x), abs(z - 0.25) < 1e-6
+            small = np.arctan2(*((1 - gap) * ends[0] + gap * ends[1])[::-1])
+            sides = {"low": 0.0, "high": sixth, "side_low": small, "side_high": sixth - small}
+            names = [name for name, of in sides.items() if middle and abs(angle - of) < 1e-6]
+            between = middle and abs(angle - sixth / 2) < 0.1
+            names += ["hub"] * (between and radius < 1.0) + ["tip"] * (between and radius > 1.7)
+            for name in names:
+                groups[name] = tag
+        for name, tag in groups.items():
+            gmsh.model.addPhysicalGroup(2, [tag], name=name)
+        gmsh.model.addPhysicalGroup(3, [tag for _, tag in gmsh.model.getEntities(3)], name="metal")
+        turn = [0.5, -np.sin(sixth), 0, 0, np.sin(sixth), 0.5, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+        gmsh.model.mesh.setPeriodic(2, [groups["high"]], [groups["low"]], turn)
+        gmsh.model.mesh.setSize(gmsh.model.getEntities(0), 0.3)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(path))
+
+
+def test_a_pair_in_a_ring_does_not_slip_as_the_ring_moves_as_one(tmp_path):
+    """Sectors have displacements in their own axes; the pair opens as the next sector moves on around the axis."""
+    write_sector(tmp_path / "sector.msh")
+    (tmp_path / "case.toml").write_text(RING)
+    structure = assemble(vd.Case.load(tmp_path / "case.toml"))
+    made = interface(structure.case, structure.matrices, ["platform"])
+    sixth = np.pi / 3
+    turn = np.array([[np.cos(sixth), -np.sin(sixth), 0], [np.sin(sixth), np.cos(sixth), 0], [0, 0, 1]])
+    ones = np.ones(len(structure.matrices.coordinates))
+
+    def apart(own, neighbour):
+        moved, other = np.kron(ones, own), np.kron(ones, turn.T @ neighbour)
+        return made.vectors[:, :2].T @ moved - made.vectors[:, 2:].T @ other
+
+    for shift in np.eye(3):
+        assert apart(shift, shift) == pytest.approx([0, 0], abs=1e-12)
+    on = np.array([-np.sin(sixth), np.cos(sixth), 0])
+    assert apart(np.zeros(3), on) == pytest.approx([0, 1], abs=1e-5)
+    assert apart(np.zeros(3), np.array([0, 0, 1.0])) == pytest.approx([-1, 0], abs=1e-12)
+    ring_reduction(structure, families=4).save(tmp_path / "ring.h5")
+    free, joined = (
+        vd.simulate(
+            vd.Scene(
+                structure={"model": "ring", "file": str(tmp_path / "ring.h5")},
+                excitation={"frequency": 300.0, "force": 100.0, "at": "tip", "wave": 2},
+                joint=[{"at": "platform@+1", "sectors": "all", "preload": 1e5 * friction, "friction": friction,
+                        "normal_stiffness": 1e6}],
+                time={"periods": 60, "transient": 50},
+            )
+        )
+        for friction in (0.0, 0.4)
+    )  # fmt: skip
+    assert abs(joined.energy_residual) < 1e-10
+    assert [contact.stick for contact in joined.contact_friction] == [1.0] * 6
+    assert [contact.stick for contact in free.contact_friction] == [0.0] * 6
+    assert joined.amplitude_mean < 0.9 * free.amplitude_mean

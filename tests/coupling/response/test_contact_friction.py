@@ -10,6 +10,7 @@ import vanedamp as vd
 from tests.coupling.scene.elements.test_joint import JOINT, LOADS, STICK, Piecewise, matrices, random_scene, scene
 from tests.tools.tiers import cases
 from vanedamp.coupling.quantities import joints
+from vanedamp.coupling.sweep.runs import Ran, Runs
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.studies.cli import main
 
@@ -141,6 +142,12 @@ def test_points_of_sweeps_have_what_runs_have(seed):
         for name in NAMES:
             assert found.quantities[name].shape == (2, 3, len(made.added["joint"]))
             np.testing.assert_array_equal(found.quantities[name][place], getattr(run, name), err_msg=name)
+
+
+def test_a_search_runs_scenes_with_joints_in_compiled_code():
+    made, numbers = random_scene(4), {"joint.0.friction": 0.3, "excitation.frequency": 22.0}
+    (found,) = Runs(made, list(numbers)).run_all([numbers], [None])
+    assert isinstance(found, Ran) and found.amplitude_mean == vd.simulate(made.replace(numbers)).amplitude_mean
 
 
 def test_files_and_pages_have_it(tmp_path):
