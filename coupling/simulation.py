@@ -10,6 +10,7 @@ from pathlib import Path
 
 from vanedamp.coupling.methods.registry import WALLS, respond
 from vanedamp.coupling.model_order.choices import choose
+from vanedamp.coupling.response import contact_friction
 from vanedamp.coupling.response.by_sector import sectors
 from vanedamp.coupling.response.evaluation import Fields, Observer, Outcome
 from vanedamp.coupling.response.moved_start import KEPT, Mean, moved
@@ -66,7 +67,11 @@ def observers_of(scene: Scene, events: bool = False, samples_per_period: int = 0
 def parts_of_run(scene: Scene, samples_per_period: int = 0) -> list[Observer]:
     """Return the observers for quantities of a run; samples_per_period: of others."""
     spots = spots_of(scene)
-    return [*parts_of(scene), *([] if spots is None else [StressObserver(spots, samples_per_period)])]
+    return [
+        *parts_of(scene),
+        *([] if spots is None else [StressObserver(spots, samples_per_period)]),
+        *([contact_friction.FRICTION_BY_CONTACT] if contact_friction.wanted(scene) else []),
+    ]
 
 
 def parts_of(scene: Scene) -> list[Observer]:

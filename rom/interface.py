@@ -45,7 +45,8 @@ class InterfaceCoordinate:
                mean displacement of a patch of which every node is a boundary coordinate; the reduction keeps the
                lowest characteristic constraint modes of these (Castanier, Tan and Pierre 2001)
     motion     "translation", or "rotation": the small rotation about the direction through the centroid, rad
-    point      where the rigid motion of an average patch is taken, m; None: at its centroid, where it is the mean
+    point      where the rigid motion of an average patch is taken, m, or to what the node is nearest; None: the
+               centroid, where that motion is the mean
 
     A patch that deforms has the rigid motion that fits it best over the area (least squares); its
     translation is the mean displacement. Raises InterfaceError or modal.matrices.MatricesError.
@@ -65,8 +66,8 @@ class InterfaceCoordinate:
             raise InterfaceError(f"{self.label}: kind must be one of {', '.join(KINDS)}, not {self.kind!r}")
         if self.motion not in MOTIONS:
             raise InterfaceError(f"{self.label}: motion must be one of {', '.join(MOTIONS)}, not {self.motion!r}")
-        if self.point is not None and (self.kind, self.motion) != ("average", "translation"):
-            raise InterfaceError(f'{self.label}: a point is for the translation of a patch of kind "average"')
+        if self.point is not None and (self.kind not in ("average", "node") or self.motion != "translation"):
+            raise InterfaceError(f'{self.label}: a point is for the translation of a patch of kind "average" or "node"')
         if self.motion == "rotation" and self.kind == "node":
             raise InterfaceError(f'{self.label}: a node has no rotation; take kind "average" or "rigid"')
         object.__setattr__(self, "direction", tuple(unit_direction(self.direction).tolist()))
@@ -251,7 +252,8 @@ def _resolved(matrices: SystemMatrices, item: InterfaceCoordinate) -> tuple[np.n
         arm = float(np.sqrt(patch.weights @ squares / patch.area))
         return _rotation(matrices, item, np.array(item.direction)), normal, centroid, arm
     if item.kind == "node":
-        nearest = int(patch.nodes[first_largest(-np.linalg.norm(offsets, axis=1))])
+        at = centroid if item.point is None else np.array(item.point)
+        nearest = int(patch.nodes[first_largest(-np.linalg.norm(centroid + offsets - at, axis=1))])
         functional = np.zeros(matrices.size)
         functional[3 * nearest : 3 * nearest + 3] = item.direction
         return functional, normal, matrices.coordinates[nearest], 0.0

@@ -24,6 +24,8 @@ __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 
 #: suffixes to the label of a displacement along a cavity: transverse motion, rotation
 NORMAL, ROTATION = ".normal", ".rotation"
+#: and of the motion across of a side of a pair
+ACROSS = "_across"
 
 #: natural frequencies that a model prints
 _SHOWN = 6

@@ -27,7 +27,7 @@ COMPLETE, _MOST_SAMPLES = 0.9, 0.5
 _ONE, _MANY = "an ensemble keeps one number a point", "not kept of an ensemble; sweep one of its samples"
 _PEAK = "the peak without bodies is in `reduction`, others are not kept"
 NOT_IN_ENSEMBLES = {
-    "loss": _ONE, "stress_component": _ONE, "section": _MANY, "lyapunov": _MANY, "undamped_top": _PEAK,
+    "loss": _ONE, "stress_component": _ONE, "section": _MANY, "joint": _MANY, "lyapunov": _MANY, "undamped_top": _PEAK,
     "fixed_top": _PEAK,
 }  # fmt: skip
 PEAK, REDUCTION = "peak_amplitude", "reduction"

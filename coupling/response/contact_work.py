@@ -1,4 +1,4 @@
-"""Work of contacts for Archard's law and laws of impact wear, and the wear by it."""
+"""Work of contacts for Archard's law and laws of impact wear, and the wear by it; friction by contact."""
 
 from __future__ import annotations
 
@@ -85,3 +85,25 @@ class ContactWear(OfContact):
     def hours_to(self, depth: float) -> float | None:
         """Return the hours to a depth of both partners together, m, at this rate; None if it is not known or 0."""
         return depth / self.depth_rate if self.depth_rate else None
+
+
+@dataclass(frozen=True)
+class ContactFriction(OfContact):
+    """Friction of a contact over the evaluated periods, without that of impacts on rigid walls."""
+
+    energy: float
+    """mean energy that friction takes in a period [J]"""
+    power: float
+    """mean power of friction [W]"""
+    stick: float
+    """fraction of the time in which the contact sticks [-]"""
+    slip: float
+    """fraction of the time in which it slips [-]"""
+    open: float
+    """fraction of the time in which it is open [-]"""
+
+    @property
+    def sentence(self) -> str:
+        """The record in a line."""
+        fractions = f"sticks {self.stick:.1%}, slips {self.slip:.1%}, open {self.open:.1%} of the time"
+        return f"{self.name}: {self.power:.4g} W, {self.energy:.4g} J per period; {fractions}"

@@ -14,7 +14,7 @@ import numpy as np
 from vanedamp.coupling.quantities.quantity import Quantity, QuantityRecord, labels, table
 from vanedamp.coupling.quantities.sums import OF_MOTION
 from vanedamp.coupling.response.contact_strength import ContactStrength
-from vanedamp.coupling.response.contact_work import ContactWear, ContactWork
+from vanedamp.coupling.response.contact_work import ContactFriction, ContactWear, ContactWork
 from vanedamp.coupling.response.restart_state import RestartState
 from vanedamp.coupling.response.sector_response import SectorResponse
 from vanedamp.coupling.response.spot_stress import SpotStress
@@ -215,6 +215,8 @@ class Response(QuantityRecord, Record, Plotted):
     """work of friction and impacts of each contact; without `[wear]` None"""
     wear: tuple[ContactWear, ...] | None = None
     """wear of each contact, at the mean rates of the evaluated periods; without `[wear]` None"""
+    contact_friction: tuple[ContactFriction, ...] | None = None
+    """friction of each contact that rubs, of scenes with `[[joint]]`; None for others, and for methods with steps"""
     stress: Annotated[tuple[SpotStress, ...] | None, Own()] = None
     """stress at the hot spots of a reduced model; None without any [Pa]"""
     sectors: Annotated[SectorResponse | None, Own()] = None
@@ -268,7 +270,7 @@ class Response(QuantityRecord, Record, Plotted):
 
     def derived(self) -> dict[str, Any]:
         """Return data of some runs only."""
-        names = ("moved_start", "estimate", "advice", "wear", "contacts", "lyapunov")
+        names = ("moved_start", "estimate", "advice", "wear", "contact_friction", "contacts", "lyapunov")
         data = {name: value for name, value in self.plain(names).items() if value is not None}
         data |= {name: _listed(table()[name], value) for name, value in self._plain.items()}
         if self.stress is not None:
@@ -293,7 +295,7 @@ class Response(QuantityRecord, Record, Plotted):
         return super().variables() | {
             name: Variable(value, one.dims, one.unit)
             for name, one in table().items()
-            if one.dims[:1] in (("hot_spot",), ("sector",)) and (value := getattr(self, name)) is not None
+            if one.dims[:1] in (("hot_spot",), ("sector",), ("joint",)) and (value := getattr(self, name)) is not None
         }
 
     def attributes(self) -> dict[str, Any]:

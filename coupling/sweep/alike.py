@@ -66,9 +66,12 @@ Keep = Callable[[int, Mapping[str, Any]], None]
 class SceneBatch:
     """Scenes that differ from one in numbers with columns, and the run that takes them in turn."""
 
-    def __init__(self, scene: Scene) -> None:
-        """Take the first scene, without open choices. Raises InputError or ValueError for one that is no such scene."""
-        self.observers = parts_of_run(scene)
+    def __init__(self, scene: Scene, sums_only: bool = False) -> None:
+        """Take the first scene, without open choices. Raises InputError or ValueError for one that is no such scene.
+
+        sums_only: nothing else is taken of the runs.
+        """
+        self.observers = [] if sums_only else parts_of_run(scene)
         run = run_of(scene, self.observers)
         for observer in self.observers:
             observer.look(run, None)
@@ -222,17 +225,17 @@ class Common(NamedTuple):
 
 
 def kind_of(
-    maker: Points, point: Mapping[str, Any], paths: list[str], common: Common | None = None
+    maker: Points, point: Mapping[str, Any], paths: list[str], common: Common | None = None, sums_only: bool = False
 ) -> SceneBatch | None:
     """Return the kind of a point's scene; None where it has to be run by itself. The last ones are kept.
 
-    common: of the maker, where it is known.
+    common: of the maker, where it is known; sums_only: as of a SceneBatch.
     """
     common = common or Common.of(maker)
     slow = {path: value for path, value in point.items() if path not in paths}
     above = [point[path] > 0.0 for path in paths if tells(path)]
     files = [*common.files, *(value for path, value in slow.items() if path in FILE_PATHS)]
-    key = common.made_of + pickle.dumps((slow, paths, above, [file_stamp(file) for file in files]))
+    key = common.made_of + pickle.dumps((slow, paths, above, sums_only, [file_stamp(file) for file in files]))
     kinds = _KEPT.kinds
     if key in kinds:
         kinds[key] = kinds.pop(key)
@@ -242,7 +245,7 @@ def kind_of(
         chosen = maker.chosen(point)
         # other values may be in the way of a column
         if chosen.start is None and columned(chosen.scene, paths) == paths:
-            kinds[key] = SceneBatch(chosen.scene)
+            kinds[key] = SceneBatch(chosen.scene, sums_only)
     if len(kinds) > _MOST:
         del kinds[next(iter(kinds))]
     return kinds[key]

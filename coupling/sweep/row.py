@@ -10,6 +10,7 @@ import numpy as np
 
 from vanedamp.coupling.quantities.quantity import Quantity, labels, possible, table
 from vanedamp.coupling.quantities.sums import OF_MOTION, OF_PLANE, OF_SECTIONS
+from vanedamp.coupling.response import contact_friction
 from vanedamp.coupling.response.response import Response
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.strength.contact_strength import wanted
@@ -23,7 +24,7 @@ NOT_IN_SWEEPS: dict[str, str] = {}
 TEXTS = ("status", "classification")
 _SECTION = "section"
 #: kept by observers of runs in compiled code (simulation.parts_of_run)
-PARTS = ("wear", "sectors", "contacts", "stress")
+PARTS = ("wear", "sectors", "contacts", "stress", "contact_friction")
 
 
 class Row:
@@ -34,14 +35,17 @@ class Row:
 
     def __init__(self, base: Scene) -> None:
         ring = ring_in_file(base.structure)
+        written = unrolled(base)
         self._sizes = {
-            "damper": len(unrolled(base).damper), "hot_spot": len(hot_spots_in_file(base.structure)),
+            "damper": len(written.damper), "joint": len(written.element_tables.get(contact_friction.JOINT, ())),
+            "hot_spot": len(hot_spots_in_file(base.structure)),
             "sector": 0 if ring is None else ring.sectors, _SECTION: base.kept.get("sections", 0),
         }  # fmt: skip
         parts = {
             OF_PLANE: base.planar, ("lyapunov",): "exponents" in base.kept, ("wear",): base.wear is not None,
             OF_SECTIONS: "sections" in base.kept,
             ("stress",): bool(self._sizes["hot_spot"]), ("sectors",): ring is not None, ("contacts",): wanted(base),
+            ("contact_friction",): contact_friction.wanted(base),
         }  # fmt: skip
         known = {name for names, there in parts.items() if there for name in names}.union(OF_MOTION)
         self.quantities = dict[str, Quantity]()
@@ -69,6 +73,11 @@ class Row:
     def keeps(self) -> bool:
         """Whether quantities need more of a run than its sums."""
         return not all(one.exists(OF_MOTION + OF_PLANE) for one in self.quantities.values())
+
+    @property
+    def searches(self) -> bool:
+        """Whether a search has all that it can ask for, quantities with one number, in the sums of runs."""
+        return all(one.exists(OF_MOTION + OF_PLANE) for one in self.quantities.values() if one.dims != ("joint",))
 
     def put(self, row: np.ndarray, response: Response, more: Mapping[str, Any]) -> tuple[str, ...]:
         """Put the quantities of a run into a row (width,); return its texts. more: data that runs lack."""

@@ -50,7 +50,7 @@ class Runs:
 
     def __init__(self, base: Scene, paths: Iterable[str]) -> None:
         self._maker, self._paths = Points(base), without_starts(columned(base, paths))
-        self._common, self._whole = Common.of(self._maker), not Row(base).keeps
+        self._common, self._whole = Common.of(self._maker), Row(base).searches
 
     def scene(self, numbers: Mapping[str, float]) -> Scene | None:
         """Return the scene with numbers; None where they make none."""
@@ -76,7 +76,7 @@ class Runs:
             for index, key in enumerate(keys(PointTable.of(points), self._paths)):
                 groups.setdefault((starts[index] is None, *key), []).append(index)
         for places in groups.values():
-            kind = kind_of(self._maker, points[places[0]], self._paths, self._common)
+            kind = kind_of(self._maker, points[places[0]], self._paths, self._common, True)
             with suppress(InputError):  # a start that does not fit: its own run says so
                 if kind is not None:
                     batch = self._ran(kind, [points[index] for index in places], [starts[index] for index in places])

@@ -29,6 +29,8 @@ from vanedamp.files.toml_input import InputError
 
 #: smaller coefficients of friction are treated as zero: their forces are lost in the round-off of others
 _SMOOTH = 1e-9
+#: singular values of normals below which they depend on each other
+_ONE = 1e-9
 #: mobility (1/kg) of a point that the first mode does not move
 _LIGHT = 1e-30
 
@@ -254,7 +256,19 @@ def element_units(scene: Scene, parts: ElementParts) -> Iterator[Unit]:
 
 
 def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
-    """Raise InputError for a friction with which a single contact may jam or have two motions (Painleve 1895)."""
+    """Raise InputError for friction by which a motion is not unique.
+
+    That of a single contact that may jam or have two motions (Painleve 1895), and that of rigid contacts of the
+    structure closed at rest whose normal forces the equations do not tell apart: joints all round a ring would lose
+    their preload to each other.
+    """
+    at_rest = [u for u in contacts if u.friction > 0.0 and u.rest <= 0.0 and u.other < 0 and u.side not in SIDES]
+    rows = [unit.normal / np.linalg.norm(unit.normal) for unit in at_rest if np.isinf(unit.element.stiffness)]
+    if len(rows) > 1 and np.linalg.matrix_rank(rows, tol=_ONE) < len(rows):
+        raise InputError(
+            f"{at_rest[0].side}: the modes do not tell the normal forces of the rigid ones apart, which friction needs; "
+            "give normal_stiffness"
+        )
     for unit in contacts:
         if np.isfinite(unit.element.stiffness):  # its force is that of its spring
             continue

@@ -76,10 +76,10 @@ axes.semilogx(preloads, peak, ".-")
 axes.set(xlabel="preload (N)", ylabel="largest mean amplitude (µm)")
 
 # %%
-# One run tells when the platforms stick, slip and part, and how much of the work friction takes.
+# One run tells for how long the platforms stick, slip and part, and how much of the work friction takes.
 
-response = vd.simulate(scene, events=True)
-kinds = [event.kind for event in response.event_list]
-print({kind: kinds.count(kind) / scene.time.periods for kind in sorted(set(kinds))}, "per period")
+response = vd.simulate(scene)
+(joint,) = response.contact_friction
+print(joint.sentence)
 print(f"friction takes {response.energy['friction'] / response.energy['excitation']:.0%} of the work")
 plt.show()

@@ -10,7 +10,9 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from vanedamp.files.toml_input import STRICT, Direction, Positive, Real, Whole
+from vanedamp.modal.algebra import rotation as turned
 from vanedamp.modal.cyclic import CyclicSector, SectorSpring, cyclic_sector
+from vanedamp.modal.matrices import unit_direction
 from vanedamp.studies.case.operation_tables import RotationTable
 
 if TYPE_CHECKING:
@@ -71,6 +73,11 @@ class RingTable:
     def _axis(self, rotation: RotationTable | None) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         table: RingTable | RotationTable = self if rotation is None else rotation
         return table.axis or (0.0, 0.0, 1.0), table.point or (0.0, 0.0, 0.0)
+
+    def turn(self, rotation: RotationTable | None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the matrix (3, 3) that turns by one sector, and a point (3,) of the axis, m; rotation: of the case."""
+        axis, point = self._axis(rotation)
+        return turned(unit_direction(axis), 2.0 * np.pi / self.sectors), np.array(point)
 
     def sector(self, matrices: SystemMatrices, rotation: RotationTable | None) -> CyclicSector:
         """Return the sector with these matrices; rotation: has the axis unless the table does. Raises CyclicError."""

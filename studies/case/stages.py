@@ -48,6 +48,7 @@ from vanedamp.rom.interface import (
     outward_normal,
     plane_motion,
 )
+from vanedamp.rom.pair import pair_motions
 from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.rotation import reduce_rotating
 from vanedamp.studies.case.calibration_tables import CalibrationTable
@@ -142,13 +143,18 @@ def base_inertia(case: Case, matrices: SystemMatrices, label: str) -> np.ndarray
 def interface(case: Case, matrices: SystemMatrices, labels: list[str] | None = None) -> Interface:
     """Return the case's interface coordinates on its matrices, all or the named ones."""
     tables = case.interface if labels is None else {label: case.interface[label] for label in labels}
-    coordinates = [item for label, table in tables.items() for item in _coordinates(label, table, matrices)]
+    coordinates = [item for label, table in tables.items() for item in _coordinates(case, label, table, matrices)]
     return Interface.on_patches(matrices, coordinates)
 
 
-def _coordinates(label: str, table: InterfaceTable, matrices: SystemMatrices) -> list[InterfaceCoordinate]:
-    """Return the interface coordinates of a table: one, or several of a motion in a plane."""
+def _coordinates(case: Case, label: str, table: InterfaceTable, matrices: SystemMatrices) -> list[InterfaceCoordinate]:
+    """Return the interface coordinates of a table: one, or several of a motion in a plane or of a pair."""
     direction = _direction(label, "direction", table.direction, table, matrices)
+    if table.paired:
+        first, second = table.groups
+        across = None if table.normal is None else _direction(label, "normal", table.normal, table, matrices)
+        turn = case.ring.turn(case.rotation) if case.ring is not None and table.next_sector else None
+        return pair_motions(matrices, label, (first, second), direction, across, table.points, table.tolerance, turn)
     if not table.planar:
         return [InterfaceCoordinate(label, table.facets, direction, table.kind, table.motion)]
     normal = table.normal
@@ -447,7 +453,8 @@ def unit_doubts(structure: Structure, first_hz: float | None = None) -> tuple[st
 def joint_doubts(structure: Structure, modes: Modes | None = None) -> tuple[str, ...]:
     """Return warnings of coincident nodes, and of strain-free modes of a supported structure."""
     matrices, support = structure.matrices, structure.case.support
-    warnings, twins = [], coincident_nodes(matrices)
+    sides = [matrices.patch(table.groups).nodes for table in structure.case.interface.values() if table.paired]
+    warnings, twins = [], np.setdiff1d(coincident_nodes(matrices), np.concatenate([np.zeros(0, np.int64), *sides]))
     if twins.size:
         point = ", ".join(f"{x:.4g}" for x in matrices.coordinates[twins[0]])
         warnings.append(

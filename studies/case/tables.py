@@ -314,24 +314,42 @@ class InterfaceTable:
     rotation about it (rom.interface).
 
     Kind "patch" and "cavity" give three coordinates, of the motion in a plane, and "node" with a `normal` the first two
-    of them (rom.interface.plane_motion).
+    of them (rom.interface.plane_motion). Kind "pair" gives four for a [[joint]] at two sides that touch: NAME_1,
+    NAME_1_across, NAME_2 and NAME_2_across (rom.pair.pair_motions).
     """
 
     facets: Annotated[str | Annotated[tuple[str, ...], Field(min_length=1)], BeforeValidator(_groups)]
-    """facet group, or several as one; or else a group of edges or points (a node set)"""
+    """facet group, or several as one; or else a group of edges or points (a node set); of a pair its two sides"""
     direction: Annotated[Direction | str, Field(union_mode="left_to_right")]
-    """direction of the motion, that from the left wall of a cavity to its right one; "normal": the facets' own; or a
-    facet group, whose outward normal it is [-]"""
-    kind: Literal["average", "rigid", "node", "full", "patch", "cavity"] = "average"
+    """direction of the motion, that from the left wall of a cavity to its right one, of a pair that in which it slips;
+    "normal": the facets' own; or a facet group, whose outward normal it is [-]"""
+    kind: Literal["average", "rigid", "node", "full", "patch", "cavity", "pair"] = "average"
     """"average": mean displacement; "rigid": moves as a rigid body; "node": that nearest to the centroid; "full": every
-    node is kept; "patch", "cavity": along, across and rotation in a plane"""
+    node is kept; "patch", "cavity": along, across and rotation in a plane; "pair": along and across of two sides"""
     motion: Literal["translation", "rotation"] = "translation"
     """"translation" along the direction, or "rotation" about it"""
     normal: Annotated[Direction | str, Field(union_mode="left_to_right")] | None = None
-    """direction across, out of the floor into the cavity, or a facet group with that outward normal (default: the
-    facets' own) [-]"""
+    """direction across, out of the floor into the cavity, or of a pair out of its second side into its first, or a
+    facet group with that outward normal (default: the facets' own) [-]"""
+    points: Annotated[Whole, Field(ge=1)] | None = None
+    """of a pair, number of pairs of nodes, spread over the sides, each with its labels: NAME.1_1 ... (default: the mean
+    motions of the sides)"""
+    tolerance: Positive | None = None
+    """largest distance of the two sides of a pair (default: a hundredth of the first one's extent) [m]"""
+    next_sector: bool = False
+    """whether the second side of a pair is that of the next sector of the ring"""
 
     def __post_init__(self) -> None:
+        if self.paired:
+            if isinstance(self.facets, str) or len(self.facets) != 2:
+                raise ValueError('facets: kind = "pair" has two sides, such as ["platform_low", "platform_high"]')
+            if self.direction == "normal" or self.motion == "rotation":
+                key = "direction" if self.direction == "normal" else "motion"
+                raise ValueError(f'{key}: kind = "pair" slips along a direction in its plane; give three numbers')
+            return
+        for key in ("points", "tolerance", "next_sector"):
+            if getattr(self, key):
+                raise ValueError(f'{key}: is for kind = "pair"; leave it out')
         if self.kind in ("patch", "cavity") and self.motion == "rotation":
             raise ValueError(f'motion: kind = "{self.kind}" has the rotation in the plane besides; leave it out')
         if self.normal is not None and self.kind not in ("patch", "cavity", "node"):
@@ -344,8 +362,13 @@ class InterfaceTable:
 
     @property
     def planar(self) -> bool:
-        """Whether it moves across its direction, too."""
-        return self.kind in ("patch", "cavity") or self.normal is not None
+        """Whether it is the motion of a cavity's surface across its direction, too."""
+        return self.kind in ("patch", "cavity") or (self.normal is not None and not self.paired)
+
+    @property
+    def paired(self) -> bool:
+        """Whether it has two sides."""
+        return self.kind == "pair"
 
     @property
     def guides(self) -> dict[str, str]:
@@ -388,9 +411,12 @@ class Case:
         ratios = {table.damping_ratio for table in self.material.values()} - {None}
         if self.modes.damping_ratio is None and len(ratios) > 1:
             raise ValueError("material: the damping ratios differ; set the one of the modes in [modes] damping_ratio")
-        at, labels = self.modes.at, list(self.interface)
+        at, labels = self.modes.at, [label for label, table in self.interface.items() if not table.paired]
         if at is not None and at not in labels:
             raise ValueError(f"modes.at: no interface '{at}'; {nearest(at, labels)}")
+        for label, table in self.interface.items():
+            if table.next_sector and self.ring is None:
+                raise ValueError(f"interface.{label}.next_sector: needs [ring] with sectors, low and high")
         if self.campbell is not None and self.rotation is None:
             raise ValueError("campbell: needs a table [rotation] with the axis of the speeds, such as axis = [1, 0, 0]")
         if self.rotation is not None and self.rotation.gyroscopic and self.modes.min_frequency:
@@ -475,15 +501,16 @@ class Case:
 
     @property
     def response_label(self) -> str | None:
-        """The interface coordinate of the rigid model: the one named, the only one, or `shroud`.
+        """The interface coordinate of the rigid model: the one named, the only one, or `shroud`; none of a pair.
 
         None without any interface. Raises InputError if the choice is ambiguous.
         """
-        if self.modes.at is not None or not self.interface:
+        labels = [label for label, table in self.interface.items() if not table.paired]
+        if self.modes.at is not None or not labels:
             return self.modes.at
-        if len(self.interface) == 1 or "shroud" in self.interface:
-            return "shroud" if "shroud" in self.interface else next(iter(self.interface))
-        raise InputError(f"modes.at: name the interface of the rigid model, one of {', '.join(self.interface)}")
+        if len(labels) == 1 or "shroud" in labels:
+            return "shroud" if "shroud" in labels else labels[0]
+        raise InputError(f"modes.at: name the interface of the rigid model, one of {', '.join(labels)}")
 
     @property
     def facet_groups(self) -> set[str]:

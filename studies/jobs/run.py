@@ -92,6 +92,7 @@ def _summary(response: Response, result: Mapping[str, Any]) -> Iterator[str]:
         if wear.volume_rate:
             depth = "" if wear.depth_rate is None else f", {1e9 * wear.depth_rate:.4g} nm/h"
             yield f"{'wear':26} {wear.name}: {wear.volume_rate:.4g} m^3/h{depth}, work rate {wear.work_rate:.4g} W"
+    yield from (f"{'friction':26} {contact.sentence}" for contact in response.contact_friction or ())
     if response.status is not Status.OK:  # last, where a reader looks
         yield f"status {response.status}: {field_docstrings(Status)[response.status.name]}"
 

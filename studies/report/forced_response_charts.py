@@ -241,6 +241,28 @@ def bodies_in_plane(response: ForcedResponse) -> list[tuple[int, str]]:
     return [(body, f"{response.name}, body {body + 1}" if several else response.name) for body in extended]
 
 
+def joints_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
+    """Draw power and fractions of the time in which joints stick and are open; shown: as of `responses_figure`."""
+    figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    for response, colour in zip(responses, cycle(responses), strict=True):
+        for joint, dash in zip(joints_of(response), DASHES, strict=False):
+            name, look = f"{response.name}, joint {joint}", {"color": colour, "dash": dash}
+            panels = [(values[:, joint], None) for values in (response.joint_power, response.joint_stick)]
+            _add_panels(figure, response, shown, name, look, [*panels, (response.joint_open[:, joint], None)])
+    figure.update_yaxes(rangemode="tozero")
+    for row, title in enumerate(("power, W", "sticks, fraction of time", "open, fraction of time"), start=1):
+        figure.update_yaxes(title_text=title, row=row, col=1)
+    return _finish(figure, responses, height=720)
+
+
+def joints_of(response: ForcedResponse) -> list[int]:
+    """Return the numbers of a response's joints, those that take most power first; none without joints."""
+    if response.joint_power is None:
+        return []
+    most = np.nan_to_num(response.joint_power).max(axis=0)
+    return np.argsort(-most, kind="stable").tolist()
+
+
 def cycle(responses: Sequence[ForcedResponse]) -> list[str]:
     """Return the colours of curves: their own, or those of their order."""
     return [response.colour or COLOURS[index % len(COLOURS)] for index, response in enumerate(responses)]

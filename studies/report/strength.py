@@ -167,5 +167,10 @@ def contacts_shown(file: str, wear: Sequence[Mapping[str, Any]], page: Page) -> 
     return {"file": file, "contacts": [{"place": _place(item)} | dict(item) for item in rows], "chart": chart}
 
 
+def friction_shown(contacts: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return the rows of a run's contacts with friction, those that take most energy first."""
+    return [{"place": _place(item)} | dict(item) for item in sorted(contacts, key=lambda item: -item["energy"])]
+
+
 def _place(item: Mapping[str, Any]) -> str:
     return contact_name(item["damper"], item["side"], item["corner"])

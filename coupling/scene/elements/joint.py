@@ -17,9 +17,11 @@ from vanedamp.files.toml_input import STRICT, Fraction, InputError, NonNegative,
 _Points = tuple[str, str]
 #: what does not move, in place of a label
 _CASING = "casing"
+#: of points that a pair gives
+_MISSING: Any = None
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=STRICT, kw_only=True)
 class Joint(SceneElement):
     """Contact with Coulomb friction between two points of the structure, or one and the casing.
 
@@ -29,11 +31,15 @@ class Joint(SceneElement):
 
     on_structure = True
     rubs = True
-    between: _Points
+    at: str | None = None
+    """pair of a case, in place of between and normal; of a ring, that of "platform@+1" has its second side in the next
+    sector"""
+    between: _Points = _MISSING
     """interface labels of a reduced model whose motions slip on each other; one may be "casing", which is at rest; of a
-    ring, "tip@+1" is in the next sector"""
-    normal: _Points
-    """labels of the motions of the same points across the joint, which opens as the first moves on from the second"""
+    ring, "tip@+1" is in the next sector (default: those of the pair)"""
+    normal: _Points = _MISSING
+    """labels of the motions of the same points across the joint, which opens as the first moves on from the second
+    (default: those of the pair)"""
     friction: NonNegative
     """coefficient of friction [-]"""
     preload: NonNegative = 0.0
@@ -55,6 +61,18 @@ class Joint(SceneElement):
     """sectors of a ring that have one (default: as written)"""
 
     def __post_init__(self) -> None:
+        if self.at is not None:
+            if self.between is not _MISSING or self.normal is not _MISSING:
+                raise ValueError("at: a pair has both of between and normal; leave them out")
+            name, mark, where = self.at.partition("@")
+            sectors = "" if where[:1] in ("+", "-") else mark + where, mark + where
+            first, second = (f"{name}_{number}" for number in (1, 2))
+            object.__setattr__(self, "between", (first + sectors[0], second + sectors[1]))
+            object.__setattr__(self, "normal", (f"{first}_across{sectors[0]}", f"{second}_across{sectors[1]}"))
+            object.__setattr__(self, "at", None)  # as if written out
+        for key, points in (("between", self.between), ("normal", self.normal)):
+            if points is _MISSING:
+                raise ValueError(f"{key}: missing; name two points, or give `at`, a pair of the case")
         for key, points in (("between", self.between), ("normal", self.normal)):
             if points[0] == points[1]:
                 raise ValueError(f"{key}: '{points[0]}' does not rub on itself; name another point, or \"{_CASING}\"")

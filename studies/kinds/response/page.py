@@ -19,7 +19,7 @@ from vanedamp.studies.report.page import Page, body_note
 from vanedamp.studies.report.plane_history import ImpactsAtPlace, places_in_order
 from vanedamp.studies.report.results import Result
 from vanedamp.studies.report.sector_charts import sectors_shown
-from vanedamp.studies.report.strength import contacts_shown, spots_shown
+from vanedamp.studies.report.strength import contacts_shown, friction_shown, spots_shown
 from vanedamp.studies.report.time_history import TimeHistory, history_figure
 
 ORDER = 60
@@ -56,6 +56,7 @@ def shown(file: str, history: TimeHistory, page: Page) -> dict[str, Any]:
         shown["sectors"] = sectors_shown(file, sectors, page)
     if wear := history.measures.get("wear"):
         shown["wear"] = contacts_shown(file, wear, page)
+    shown["friction"] = friction_shown(history.measures.get("contact_friction", ()))
     if len(history.time):
         late = history.late()
         shown["chart"] = page.chart("history", history_figure(late), late.header(), late.rows(), [file])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from vanedamp.coupling.quantities import joints
 from vanedamp.coupling.quantities.impacts import attached_mass_fraction, impacts_per_period
 from vanedamp.coupling.quantities.sums import LOSSES
 from vanedamp.coupling.sweep.record import Sweep
@@ -29,6 +30,8 @@ from vanedamp.studies.report.forced_response_charts import (
     bodies_in_plane,
     cycle,
     energy_figure,
+    joints_figure,
+    joints_of,
     mistuning_figure,
     plane_figure,
     responses_figure,
@@ -56,6 +59,8 @@ ORDER = 50
 _MOST_CURVES, _DRAWN, _MOST_PANELS = 240, 8, 6
 #: steady states in the table below basins
 _MOST_STATES = 24
+#: joints of a response in a table, those that take most power
+_MOST_JOINTS = 4
 #: measures of each chart of responses
 _COLUMNS = {
     "response": ("undamped", "fixed", "damped_max", "damped_mean"),
@@ -120,6 +125,7 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
         for kind, figure in figures.items()
     }
     charts["plane"] = _plane_chart(responses, shown, page)
+    charts["joints"] = _joints_chart(responses, shown, page)
     rows = [
         {
             "name": response.name, "headline": response.headline, "shown": response.name in shown, "colour": colour,
@@ -130,7 +136,7 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
     ]  # fmt: skip
     return charts | {
         "axis": axis, "units": responses[0].units, "onset_of": max((curve.onset_of for curve in responses), key=len),
-        "rows": rows, "every": every, "panels": len(panels),
+        "rows": rows, "every": every, "panels": len(panels), "at_peaks": list(_at_peaks(responses, shown)),
         "picks": len(rows) > 1,
     }  # fmt: skip
 
@@ -148,6 +154,32 @@ def _plane_chart(responses: Sequence[ForcedResponse], shown: Collection[str], pa
     )
     header = ("response", planar[0].axis, "body", *planar[0].in_plane)
     return page.chart("plane", plane_figure(planar, shown), header, rows, [response.source for response in planar])
+
+
+def _joints_chart(responses: Sequence[ForcedResponse], shown: Collection[str], page: Page) -> Chart | None:
+    """Return the chart of the joints' power and states; None without joints."""
+    rubbing = [response for response in responses if joints_of(response)]
+    if not rubbing:
+        return None
+    names = [one.name for one in joints.QUANTITIES]
+    rows = (
+        [response.name, x, joint, *(float(getattr(response, name)[at, joint]) for name in names)]
+        for response in rubbing
+        for joint in joints_of(response)
+        for at, x in enumerate(response.x.tolist())
+    )
+    header, sources = ("response", rubbing[0].axis, "joint", *names), [response.source for response in rubbing]
+    return page.chart("joints", joints_figure(rubbing, shown), header, rows, sources)
+
+
+def _at_peaks(responses: Sequence[ForcedResponse], shown: Collection[str]) -> Iterator[dict[str, Any]]:
+    """Yield what each joint of the drawn responses takes at its largest mean amplitude, and its states there."""
+    for response in responses:
+        if response.name in shown and np.isfinite(response.damped_mean).any():
+            at = int(np.nanargmax(response.damped_mean))
+            for joint in joints_of(response)[:_MOST_JOINTS]:
+                values = {one.name: float(getattr(response, one.name)[at, joint]) for one in joints.QUANTITIES}
+                yield {"name": response.name, "joint": joint, "at": response.x[at], **values}
 
 
 def _table(responses: Sequence[ForcedResponse], columns: Sequence[str]) -> Iterator[list[Any]]:

@@ -169,7 +169,7 @@ def test_open_choice_of_the_response_is_refused(tmp_path):
         (
             '"c1_floor"',
             '"c1_floor"\nkind = "mean"',
-            "interface.c1.kind: should be 'average', 'rigid', 'node', 'full', 'patch' or 'cavity'",
+            "interface.c1.kind: should be 'average', 'rigid', 'node', 'full', 'patch', 'cavity' or 'pair'",
         ),
         ('facets = "c1_floor"\n', "", "interface.c1.facets: missing"),
         ('c1_floor"\ndirection = [0, 1, 0]', 'c1_floor"\ndirection = [0, 0, 0]', f"interface.c1.direction: {THREE}"),
