@@ -266,7 +266,7 @@ def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
     rows = [unit.normal / np.linalg.norm(unit.normal) for unit in at_rest if np.isinf(unit.element.stiffness)]
     if len(rows) > 1 and np.linalg.matrix_rank(rows, tol=_ONE) < len(rows):
         raise InputError(
-            f"{at_rest[0].side}: the modes do not tell the normal forces of the rigid ones apart, which friction needs; "
+            f"{at_rest[0].side}: the modes do not tell normal forces of rigid ones apart, which friction needs; "
             "give normal_stiffness"
         )
     for unit in contacts:

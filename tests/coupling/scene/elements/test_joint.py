@@ -106,9 +106,12 @@ class Piecewise:
         over = abs(self.drag @ z) - self.friction * (self.push @ z)
         return STICK if event != "slip" and over <= 0.0 else -np.sign(self.drag @ z)
 
+    def start(self):
+        return np.r_[np.zeros(len(self.turn) - 3), 1.0, 0.0, 1.0]
+
     def run(self, periods):
         """Return states at the ends of periods (periods, 2 n + 3), and events."""
-        z = np.r_[np.zeros(len(self.turn) - 3), 1.0, 0.0, 1.0]
+        z = self.start()
         state = STICK if self.rest < 0.0 else OPEN
         sections, events, t = [], [], 0.0
         for period in range(1, periods + 1):
@@ -196,7 +199,10 @@ def random_scene(seed):
         stiffness, rigid = {"normal_stiffness": 10 ** rng.uniform(4, 7)}, {"restitution": rng.uniform(0, 0.8)}
         load, gap = {"preload": rng.uniform(0, 40)}, {"gap": rng.uniform(0, 5e-4)}
         kinds = (stiffness | load, rigid | load, rigid | gap, stiffness | gap)
-        return points | kinds[rng.integers(4)] | {"friction": rng.uniform(0, 0.9)}
+        kind = kinds[rng.integers(4)] | {"friction": rng.uniform(0, 0.9)}
+        if "normal_stiffness" in kind and rng.random() < 0.5:
+            kind |= {"tangential_stiffness": 10 ** rng.uniform(3.5, 7)}
+        return points | kind
 
     joints = [joint({"between": ["a", "b"], "normal": ["a_across", "b_across"]})]
     if rng.random() < 0.6:
