@@ -122,7 +122,8 @@ def followed(room, eq, turns, state, z):
     """Return the map to sliders as they are in states (u,): slipping ones follow their drivers, others rest."""
     size, sliders, map_ = len(eq.root), len(eq.bound), identity(room, eq, turns)
     for j in range(sliders):
-        at, way = size - sliders + j, state[eq.jenkins + j]
+        r = eq.sprung[j]
+        at, way = size - sliders + j, state[r]
         for k in range(size):
             map_.rates[at, k] = 0.0
         if way == STICK:
@@ -134,7 +135,23 @@ def followed(room, eq, turns, state, z):
             if is_slip(way):
                 map_.offset[at, p] -= way * turns.bound[p, j]
             map_.offset[size + at, p] = dot(turns.follows[p, j, size:], z[size:])
+        if is_slip(way) and r < eq.contacts:
+            _ease(eq, turns, map_, way, r, j, at, z)
     return map_
+
+
+@inlined
+def _ease(eq, turns, map_, way, r, j, at, z):
+    """Add what a slider that slips moves by, as the bound falls with the contact's normal force."""
+    size = len(eq.root)
+    ease, opened, opens = way * eq.ease[j], dot(eq.gap[r], z), dot(eq.speed[r], z) / eq.rate[at]
+    for k in range(size):
+        map_.places[at, k] += ease * eq.gap[r, k]
+        map_.rates[at, k] += ease * eq.speed[r, size + k] / eq.rate[at]
+    for p in range(turns.numbers):
+        map_.offset[at, p] += way * turns.ease[p, j] * opened + ease * dot(turns.gap[p, r], z)
+        moved = ease * dot(turns.speed[p, r], z) / eq.rate[at]
+        map_.offset[size + at, p] += way * turns.ease[p, j] * opens + moved
 
 
 @counting

@@ -51,10 +51,10 @@ class ScaledDynamics:
 
     scale: (k,) sizes of states; to_state, from_state: (k, 2N) and (2N, k) between u and states; rows: (2u, N) J in
     coordinates root mass q; gap: (u, K), speed: (2u, K) functionals of gaps and of the rows' speeds; typical: (K,)
-    sizes of z in a typical motion; follows (j, 2N), bound (j,): u of a slider that slips is follows u - way bound;
-    pulled: (j, N) elongations; response: (K,) displacement, m; outputs, tilts: (., K) further outputs, m, and tilts of
-    planar bodies in their cavities, rad. like: dynamics of another scene whose frequencies and
-    size serve here, too, so that both compare.
+    sizes of z in a typical motion; follows (j, 2N), bound, ease (j,): u of a slider that slips is follows u - way
+    bound, and, of a contact, + way ease gap, since its bound falls as the gap opens; pulled: (j, N) elongations;
+    response: (K,) displacement, m; outputs, tilts: (., K) further outputs, m, and tilts of planar bodies in their
+    cavities, rad. like: dynamics of another scene whose frequencies and size serve here, too, so that both compare.
     """
 
     def __init__(self, frame: Frame, scale: np.ndarray, like: ScaledDynamics | None = None) -> None:
@@ -84,15 +84,17 @@ class ScaledDynamics:
         self.scale, self.to_state = scale, frame.to_state / self.unit
         self.from_state = self.unit[:, None] * frame.from_state
         self.typical = np.r_[np.abs(values(self.from_state)) @ scale, np.full(1 + 2 * e, self.size)]
-        #: units that are Jenkins elements, and coordinates (j,) of their sliders
-        self.jenkins = slice(u - len(system.tangential), None)
+        #: units with sliders, and coordinates (j,) of these
+        self.sprung = system.sprung
         self.sliders = np.arange(size - len(system.tangential), size)
         drawn = np.where(np.arange(size) < size - len(self.sliders), system.elongation, 0.0)
         own_unit = self.unit[self.sliders], self.root[self.sliders]
         self.follows = np.hstack(
             [own_unit[0][:, None] * drawn / self.unit[:size], own_unit[1][:, None] * drawn / self.root]
         )
-        self.bound = own_unit[0] * system.limit[self.jenkins] / system.tangential
+        self.bound = own_unit[0] * system.limit[self.sprung] / system.tangential
+        springs = np.where(self.sprung < system.contacts, system.spring[self.sprung], 0.0)
+        self.ease = own_unit[0] * system.friction[self.sprung] * springs / system.tangential
         self.pulled = system.elongation / self.root
         self.response = zeros(sine.stop)
         self.response[self.places] = system.response / self.unit[:size]

@@ -1,6 +1,6 @@
 """The equations of a system as compiled functions take them: of ScaledDynamics, of its numbers, and of the flows met.
 
-N coordinates, u units, K entries of z, k states, j sliders of Jenkins elements, e harmonics, b bodies; P numbers by
+N coordinates, u units, K entries of z, k states, j sliders, e harmonics, b bodies; P numbers by
 which there are derivatives, k + P columns of these.
 """
 
@@ -31,7 +31,6 @@ class Equations(NamedTuple):
 
     modes: int
     contacts: int
-    jenkins: int  # the first unit that is one
     two_phases: bool
     law: bool  # whether restitutions depend on speeds
     parts: int  # of the system that are not coupled
@@ -52,6 +51,9 @@ class Equations(NamedTuple):
     part: np.ndarray  # (N,) int
     follows: np.ndarray  # (j, 2N)
     bound: np.ndarray  # (j,)
+    ease: np.ndarray  # (j,)
+    sprung: np.ndarray  # (j,) int
+    slider: np.ndarray  # (u,) int
     frequency: np.ndarray  # (e,)
     mass: np.ndarray  # (N,)
     J: np.ndarray  # (2u, N)
@@ -70,7 +72,6 @@ class Equations(NamedTuple):
     floor: np.ndarray  # (b, N)
     travel: np.ndarray  # (b,) gaps of the bodies' cavities
     tangential: np.ndarray  # (j,)
-    longest: np.ndarray  # (j,)
     # of the event functions, by their codes: order, terms: signal and factor of each, -1: none; numbers as factors
     order: np.ndarray  # (c,) int
     terms: np.ndarray  # (c, 3, 2) int
@@ -98,6 +99,7 @@ class EquationTangents(NamedTuple):
     from_state: np.ndarray
     follows: np.ndarray
     bound: np.ndarray
+    ease: np.ndarray
     tangential: np.ndarray
 
 
@@ -137,7 +139,7 @@ class FlowStack(NamedTuple):
 def equations_of(dynamics: ScaledDynamics) -> Equations:
     """Return the equations of a system by its dynamics."""
     d, system = dynamics, dynamics.system
-    unit, codes = np.arange(len(system.rest)), max(EVENTS) + 1
+    codes = max(EVENTS) + 1
     order, terms = np.zeros(codes, int), np.full((codes, _TERMS, 2), -1)
     factor, scaled = np.zeros((codes, _TERMS)), np.full((codes, _TERMS), -1)
     for code, event in EVENTS.items():
@@ -149,13 +151,13 @@ def equations_of(dynamics: ScaledDynamics) -> Equations:
             scaled[code, place] = _SCALES.index(name)
     cavities = [d.frame.scene.cavity[index] for index in system.cavity]
     arrays = {
-        "modes": system.modes, "contacts": system.contacts, "jenkins": len(unit) - len(system.tangential),
+        "modes": system.modes, "contacts": system.contacts,
         "parts": int(d.part.max(initial=-1)) + 1, "part": d.part, "two_phases": bool(system.two_phases),
         "law": bool(system.restitution_at), "size": float(d.size),
         "in_line": bool(np.all(system.tilt < 0)), "period": float(system.period), "omega": float(system.omega),
         "mobility": np.diag(system.delassus), "rubs": rubs(system).astype(int),
         "floor_unit": (~contacts_of(system) & (system.surface == FLOOR)).astype(int),
-        "travel": np.array([cavity.gap for cavity in cavities], float), "longest": d.frame.longest,
+        "travel": np.array([cavity.gap for cavity in cavities], float),
         "order": order, "terms": terms, "factor": factor, "scaled": scaled,
     }  # fmt: skip
     known = system._asdict() | vars(d) | arrays

@@ -31,7 +31,7 @@ class FlowDerivative:
         self.forces[:, u + n] = -turned[:, n] * flow.forces[n] - drag[n] * self.forces[:, n]
         self.forces[:, u + s.slides, one] = -(way * of.limit)[:, s.slides] / dynamics.size
         acts = of.rows.copy()
-        acts[:, u:][:, dynamics.jenkins] += of.pulled
+        acts[:, u + dynamics.sprung] += of.pulled
         free = of.load + acts.transpose(0, 2, 1) @ flow.known + s.drawn.T @ self.forces
         stretch, pull, spring = dynamics.pulled[s.holds], of.pulled[:, s.holds], system.tangential[s.holds, None]
         turns = pull.transpose(0, 2, 1) @ (spring * stretch)
@@ -51,9 +51,12 @@ class FlowDerivative:
         self.forces[:, u + m] -= turned[:, m] * flow.carried[: len(m)] + drag[m] * carried[:, : len(m)]
         self.X = of.turn.copy()
         self.X[:, rates] = np.reshape([s.followed(each) for each in moved], moved.shape)
-        slips = flow.state[dynamics.jenkins] != codes.STICK
-        follows = of.follows[:, slips, rates]
-        self.X[:, rates][:, dynamics.sliders[slips]] += follows @ (s.oblique @ flow.free)
+        moves = flow.state[dynamics.sprung] != codes.STICK
+        at, unit = dynamics.sliders[moves], dynamics.sprung[moves]
+        ease, of_ease = (part[..., moves] / dynamics.rate[at] for part in (dynamics.ease, of.ease))
+        eased = of_ease[..., None] * dynamics.rows[unit] + ease[:, None] * of.rows[:, unit]
+        follows = of.follows[:, moves, rates] + way[unit, None] * eased
+        self.X[:, rates][:, at] += follows @ (s.oblique @ flow.free)
 
     def _least(self, carried: np.ndarray, of_rows: np.ndarray, mobility: np.ndarray) -> np.ndarray:
         """Return what derivatives of the kept rows' forces (P, k, K) lack for these to stay the least.

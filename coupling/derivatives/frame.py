@@ -17,8 +17,8 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.flow import attached, matrices
 from vanedamp.coupling.system.modal_basis import transfer_of
 from vanedamp.coupling.system.resonance import steady_motion
-from vanedamp.coupling.system.system import System
-from vanedamp.coupling.tangents.dual import inverse, zeros
+from vanedamp.coupling.system.system import SURFACES, System
+from vanedamp.coupling.tangents.dual import array, inverse, zeros
 from vanedamp.files.store import frozen
 from vanedamp.files.toml_input import InputError
 
@@ -29,9 +29,8 @@ class Frame:
     speed: of rotation at which the states' modes were taken, rad/s; None: the scene's own. A reduced model's modes turn
     with the speed, and states of different speeds are compared along a branch (system.modal_basis.modal_transfer).
     begin: periods of the excitation from its start to time zero of the system and of the states.
-    to_state, from_state: (k, 2N) and (2N, k), between (q, q') and states; sliders of Jenkins elements have no rates
-    of these. drawn: (j,) numbers of the friction dampers that are Jenkins elements, each with its elongation as a
-    state; longest: (j,) m, elongations at their bounds.
+    to_state, from_state: (k, 2N) and (2N, k), between (q, q') and states; sliders have no rates
+    of these: the elongations of their springs are states. longest: (j,) m, typical elongations at their bounds.
     """
 
     def __init__(self, scene: Scene, speed: float | None = None, begin: float = 0.0) -> None:
@@ -44,12 +43,18 @@ class Frame:
             self._back = inverse(self._turn)
         self.extended = np.flatnonzero(self.system.tilt >= 0)
         size, sliders = len(self.system.mass), len(self.system.tangential)
-        self.drawn = self.system.body[len(self.system.body) - sliders :]
-        self.longest = self.system.limit[len(self.system.limit) - sliders :] / self.system.tangential
+        self.longest = self._longest()
         self.to_state = self._to_state()
         moves = slice(0, 2 * size - sliders)
         self.from_state = zeros((2 * size, len(self.to_state)))
         self.from_state[moves] = inverse(self.to_state[:, moves])
+
+    def _longest(self) -> np.ndarray:
+        """Return elongations (j,) at bounds, of contacts as far as their gaps let their springs be pressed."""
+        system = self.system
+        unit = system.sprung
+        press = [0.0 if r >= system.contacts else system.friction[r] * system.spring[r] * system.play[r] for r in unit]
+        return (system.limit[unit] + array(press)) / system.tangential
 
     def _to_state(self) -> np.ndarray:
         """Return the map (k, 2N) of (q, q') to states."""
@@ -77,7 +82,11 @@ class Frame:
         )]  # fmt: skip
         return tuple(
             f"{who} {i}{name}{rate}" for who, numbers, name in groups for rate in ("", " rate") for i in numbers
-        ) + tuple(f"friction damper {i} elongation" for i in self.drawn)
+        ) + tuple(
+            f"{'friction damper' if r >= self.system.contacts else SURFACES[self.system.surface[r]]} "
+            f"{self.system.body[r]} elongation"
+            for r in self.system.sprung
+        )
 
     def state_of(self, restart: RestartState) -> np.ndarray:
         """Return the state (k,) of a restart state."""
@@ -85,15 +94,15 @@ class Frame:
         out_of_line = (restart.lift, restart.lift_velocity, restart.tilt, restart.tilt_rate)
         return np.concatenate([
             back @ restart.displacement, back @ restart.velocity, restart.slip, restart.slip_velocity,
-            *(part[self.extended] for part in out_of_line), restart.elongation[self.drawn],
+            *(part[self.extended] for part in out_of_line), restart.elongation[self.system.drawn],
         ])  # fmt: skip
 
     def restart_of(self, state: np.ndarray) -> RestartState:
         """Return the restart state of a state (k,)."""
         n, b, more = self.system.modes, self.system.bodies, len(self.extended)
         parts = np.split(np.asarray(state, float), np.cumsum([n, n, b, b, more, more, more, more]))
-        whole, elongation = np.zeros((4, b if self.system.in_plane else 0)), np.zeros(self.system.dampers)
-        whole[:, self.extended], elongation[self.drawn] = parts[4:8], parts[8]
+        whole, elongation = np.zeros((4, b if self.system.in_plane else 0)), np.zeros(self.system.elongations)
+        whole[:, self.extended], elongation[self.system.drawn] = parts[4:8], parts[8]
         structure = (self._turn @ part for part in parts[:2])
         return RestartState(*map(frozen, (*structure, *parts[2:4], elongation, self.system.travels, *whole)))
 

@@ -35,8 +35,8 @@ StartOf = Callable[[Scene, Frame], np.ndarray]
 class EquationArrays(NamedTuple):
     """Arrays of the equations, in the scales of ScaledDynamics: N coordinates, u units, j sliders, k states.
 
-    follows, bound: (j, 2N) and (j,), u of a slider that slips is follows u - way bound (places only); others as in
-    System and ScaledDynamics. Of derivatives by P numbers, every array has an axis (P,) before these.
+    follows, bound, ease: of sliders that slip, as in ScaledDynamics (bound: of places only); others as in System and
+    ScaledDynamics. Of derivatives by P numbers, every array has an axis (P,) before these.
     """
 
     root: np.ndarray  # (N,)
@@ -49,6 +49,7 @@ class EquationArrays(NamedTuple):
     from_state: np.ndarray  # (2N, k)
     follows: np.ndarray  # (j, 2N)
     bound: np.ndarray  # (j,)
+    ease: np.ndarray  # (j,)
     pulled: np.ndarray  # (j, N)
     response: np.ndarray  # (K,)
     outputs: np.ndarray  # (o, K)

@@ -93,19 +93,12 @@ def _placed(room, eq, turns, walk, trace, start, z):
 
     Springs of friction dampers are unloaded to their bounds.
     """
-    k, P, one, sliders, bodies = len(eq.scale), turns.numbers, len(eq.unit), len(eq.bound), len(eq.along)
-    of_states, offset, first = matrix(room, k, k + P), matrix(room, one, P), k - sliders
+    k, P, one, bodies = len(eq.scale), turns.numbers, len(eq.unit), len(eq.along)
+    of_states, offset = matrix(room, k, k + P), matrix(room, one, P)
     for s in range(k):
         of_states[s, s] = 1.0
         for p in range(P):
             of_states[s, k + p] = walk.turns[s, p]
-    for j in range(sliders):
-        elongation = walk.given[first + j]
-        if abs(elongation) > eq.longest[j]:
-            of_states[first + j, first + j] = 0.0
-            for p in range(P):
-                bound = turns.limit[p, eq.jenkins + j] - eq.longest[j] * turns.tangential[p, j]
-                of_states[first + j, k + p] = math.copysign(bound / eq.tangential[j], elongation * bound)
     state = times(room, eq.to_state, z[:one])
     for p in range(P):
         for i in range(one):
@@ -118,11 +111,44 @@ def _placed(room, eq, turns, walk, trace, start, z):
             count += 1
     if count > 0:
         _push(room, eq, turns, trace, start, z, of_states, offset, pushed[:count])
+    for j in range(len(eq.sprung)):
+        _unload(room, eq, turns, walk, j, z, of_states, offset)
     derivative = product(room, eq.from_state, of_states)
     for i in range(one):
         for p in range(P):
             derivative[i, k + p] += offset[i, p]
     return derivative
+
+
+@counting
+def _unload(room, eq, turns, walk, j, z, of_states, offset):
+    """Let the elongation of a spring before a slider, a state, be that of its bound where it would be longer."""
+    k, at, r, force, opened = len(eq.scale), len(eq.scale) - len(eq.sprung) + j, eq.sprung[j], 0.0, 0.0
+    if r < eq.contacts:
+        opened = min(dot(eq.gap[r], z), 0.0)
+        force = -eq.spring[r] * opened
+    longest = (eq.limit[r] + eq.friction[r] * force) / eq.tangential[j]
+    if abs(walk.given[at]) <= longest:
+        return
+    way = math.copysign(1.0 / eq.tangential[j], walk.given[at])
+    gap = vector(room, of_states.shape[1])
+    if opened < 0.0:
+        for i in range(len(eq.unit)):
+            if eq.gap[r, i] != 0.0:
+                for c in range(len(gap)):
+                    moved = offset[i, c - k] if c >= k else 0.0
+                    for s in range(k):
+                        moved += eq.from_state[i, s] * of_states[s, c]
+                    gap[c] += eq.gap[r, i] * moved
+    for c in range(len(gap)):
+        more, p = 0.0, c - k
+        if opened < 0.0:
+            more -= eq.friction[r] * eq.spring[r] * gap[c]
+        if p >= 0:
+            more += turns.limit[p, r] + turns.friction[p, r] * force - longest * turns.tangential[p, j]
+            if opened < 0.0:
+                more -= eq.friction[r] * (turns.spring[p, r] * opened + eq.spring[r] * dot(turns.gap[p, r], z))
+        of_states[at, c] = way * more
 
 
 @counting
@@ -231,8 +257,8 @@ def _loose(room, eq, turns, flows, walk, trace, f, z, M):
         edge = noise[r] + _NEAR * grip
         if least >= -edge and (least <= edge or _turned(room, eq, turns, walk, r, z, M, GAPS)):
             return True
-    for r in range(eq.contacts, eq.jenkins):
-        if not flows.stuck[f, r] or abs(force[units + r]) < (1.0 - _NEAR) * eq.limit[r]:
+    for r in range(eq.contacts, units):
+        if eq.slider[r] >= 0 or not flows.stuck[f, r] or abs(force[units + r]) < (1.0 - _NEAR) * eq.limit[r]:
             continue
         pushed = False
         for other in range(eq.contacts if eq.floor_unit[r] else 0):

@@ -3,7 +3,7 @@
 Jean (1999); Acary and Brogliato (2008), chapter 10. The theta method for the smooth part, Newton's law on normal
 velocities and Coulomb's on slips; a contact takes part in a step if its gap, half a step ahead, is closed. Second order
 where no row is active (theta = 1/2), first order over impacts. An impact that others bring about within a step is a
-problem of its own, after theirs. Springs of compliant contacts and Jenkins elements enter the same problem, by their
+problem of its own, after theirs. Springs of compliant contacts and before sliders enter the same problem, by their
 mean force over the step. In the plane impulses never bring energy (Kane's paradox): all coefficients of restitution are
 smaller by one factor then, as in engine.plane.impacts.
 """
@@ -193,7 +193,7 @@ def _two_phases(system, motion, problem, turned, tolerance):
             if speed <= motion.slowest[0] or turn == _TURNS - 1:
                 list_row(problem, count, r, speed, 0.0, math.inf, 0.0)
                 approach[r] = -speed
-                count = list_slip(system, problem, count, r, slip, 0.0, 0.0)
+                count = list_slip(system, problem, count, r, slip, 0.0, 0.0, 0.0)
         if not approaching:
             return True
         for phase in range(2):
@@ -227,19 +227,17 @@ def _expand(system, problem, count, approach):
 def _list_rows(system, motion, problem, h, theta, turn):
     """Set up the problem of the rows that take part in a turn. Return their number."""
     u, count, free, slowest = len(system.rest), ZERO, motion.coordinates[_FREE], motion.slowest[0]
-    first = u - len(system.tangential)
     for rank in range(u):
         r = problem.order[rank]
+        slip, yields = row_speed(system, u + r, free), 0.0
+        if system.slider[r] >= 0:
+            slip, yields = _on_spring(
+                h, theta, system.tangential[system.slider[r]], 0.0, elongation(system, system.slider[r], motion.q),
+                motion.before[u + r], motion.impulse[u + r], slip,
+            )  # fmt: skip
         if r >= system.contacts:
             low, high = -h * system.limit[r] - motion.impulse[u + r], h * system.limit[r] - motion.impulse[u + r]
-            now, soft = row_speed(system, u + r, free), 0.0
-            if r >= first:
-                stretched = elongation(system, r - first, motion.q)
-                now, soft = _on_spring(
-                    h, theta, system.tangential[r - first], 0.0, stretched, motion.before[u + r],
-                    motion.impulse[u + r], now,
-                )  # fmt: skip
-            list_row(problem, count, u + r, now, low, high, soft)
+            list_row(problem, count, u + r, slip, low, high, yields)
             count += 1
             continue
         rigid = is_rigid(system, r)
@@ -263,7 +261,7 @@ def _list_rows(system, motion, problem, h, theta, turn):
             )
             list_row(problem, count, r, now, -motion.impulse[r], math.inf, soft)
             bound, had = system.friction[r] * motion.impulse[r], motion.impulse[u + r]
-        count = list_slip(system, problem, count, r, row_speed(system, u + r, free), bound, had)
+        count = list_slip(system, problem, count, r, slip, bound, had, yields)
     return count
 
 

@@ -132,7 +132,7 @@ def march_central_difference(system, times, motion, records, inverse, laws, log,
 def newmark_matrices(system: System, step: float, alpha: float) -> tuple[np.ndarray, Sparse, np.ndarray, np.ndarray]:
     """Return alpha, beta, gamma; inverse iteration matrix, (1 + alpha) times its product with J^T, mobility (2u, 2u).
 
-    Coordinates without mass, the sliders of Jenkins elements, have no row of J and stay where they are.
+    Coordinates without mass, the sliders, have no row of J and stay where they are.
     """
     beta, gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
     matrix = np.diag(system.mass) + (1 + alpha) * beta * step**2 * system.stiffness
@@ -213,10 +213,13 @@ def _correct(system, times, motion, problem, parameters, turned, count):
 @kernel
 def _list_rows(system, problem, laws, h, ahead, fast, last, beta, gamma):
     """Set up the problem of the rows that may carry force. Return their number."""
-    count, u, first = ZERO, len(system.rest), len(system.rest) - len(system.tangential)
+    count, u = ZERO, len(system.rest)
     for rank in range(u):
         r = problem.order[rank]
-        slip = row_speed(system, u + r, fast) / (gamma * h)
+        slip, soft = row_speed(system, u + r, fast) / (gamma * h), 0.0
+        if system.slider[r] >= 0:
+            slip = elongation(system, system.slider[r], ahead) / (beta * h * h)
+            soft = 1.0 / (system.tangential[system.slider[r]] * beta * h * h)
         if r < system.contacts:
             opened = gap(system, r, ahead)
             if opened > 0.0:
@@ -226,12 +229,10 @@ def _list_rows(system, problem, laws, h, ahead, fast, last, beta, gamma):
             stiff = laws.spring[r] * beta * h * h + dashpot * gamma * h
             shift = (laws.spring[r] * opened + dashpot * rate) / stiff
             list_row(problem, count, r, shift, 0.0, math.inf, 1.0 / stiff)
-            count = list_slip(system, problem, count, r, slip, 0.0, 0.0)
+            count = list_slip(system, problem, count, r, slip, 0.0, 0.0, soft)
             continue
-        soft = laws.slow[r] / (system.limit[r] * gamma * h)
-        if r >= first:
-            slip = elongation(system, r - first, ahead) / (beta * h * h)
-            soft = 1.0 / (system.tangential[r - first] * beta * h * h)
+        if system.slider[r] < 0:
+            soft = laws.slow[r] / (system.limit[r] * gamma * h)
         list_row(problem, count, u + r, slip, -system.limit[r], system.limit[r], soft)
         count += 1
     return count

@@ -96,17 +96,11 @@ def first_share(gap, rate, last, h):
 def set_forces(system, laws, motion, gap, drawn, rate, h):
     """Set the forces of all rows by their laws, at gaps (u,) and rates (2u,) of the rows, and their impulses.
 
-    drawn: (2u,) displacement of the drivers of sliders of Jenkins elements, by their rows. They follow in motion.q
-    where their springs would go beyond their bounds. h: time since the last forces, s.
+    drawn: (2u,) displacement of the drivers of sliders, by their rows. They follow in motion.q where their springs
+    would go beyond their bounds. h: time since the last forces, s.
     """
     u, sliders, q = len(system.rest), len(system.tangential), motion.q
-    for j in range(sliders):
-        row, at, spring = 2 * u - sliders + j, len(q) - sliders + j, system.tangential[j]
-        most = system.limit[u - sliders + j] / spring
-        stretched = min(max(drawn[row] - q[at], -most), most)
-        q[at] = drawn[row] - stretched
-        _put(motion, row, -spring * stretched, h)
-    for r in range(u - sliders):
+    for r in range(u):
         bound = system.limit[r]
         if r < system.contacts:
             push = 0.0
@@ -115,7 +109,12 @@ def set_forces(system, laws, motion, gap, drawn, rate, h):
                 push = max(-laws.spring[r] * gap[r] - dashpot * rate[r], 0.0)
             _put(motion, r, push, h)
             bound = system.friction[r] * push
-        if has_friction(system, r):
+        if system.slider[r] >= 0:
+            at, spring = len(q) - sliders + system.slider[r], system.tangential[system.slider[r]]
+            stretched = min(max(drawn[u + r] - q[at], -bound / spring), bound / spring)
+            q[at] = drawn[u + r] - stretched
+            _put(motion, u + r, -spring * stretched, h)
+        elif has_friction(system, r):
             drag, slip, slow = 0.0, rate[u + r], laws.slow[r]
             if bound > 0.0 and slow > 0.0:
                 drag = bound * slip / slow
@@ -135,7 +134,7 @@ def _put(motion, row, force, h):
 def set_rows(system, motion, q, v):
     """Set gaps and speeds (motion.before) of the rows that may have forces, at coordinates q and velocities v.
 
-    motion.rows[0]: displacements of the drivers of sliders of Jenkins elements.
+    motion.rows[0]: displacements of the drivers of sliders.
     """
     u = len(system.rest)
     set_gaps(system, motion)
@@ -144,7 +143,7 @@ def set_rows(system, motion, q, v):
             motion.before[r] = row_speed(system, r, v)
         if has_friction(system, r):
             motion.before[u + r] = row_speed(system, u + r, v)
-        if r >= u - len(system.tangential):
+        if system.slider[r] >= 0:
             motion.rows[0, u + r] = row_speed(system, u + r, q)
 
 

@@ -68,14 +68,15 @@ def list_row(problem, count, row, now, low, high, soft):
 
 
 @kernel
-def list_slip(system, problem, count, r, now, bound, had):
+def list_slip(system, problem, count, r, now, bound, had, soft):
     """Enter the slip of the contact whose normal is row number `count`. Return the number of the next row.
 
-    bound, had: of its force by a normal force that has been applied already, and that friction.
+    bound, had: of its force by a normal force that has been applied already, and that friction; soft: compliance of the
+    row.
     """
     if system.friction[r] == 0.0:
         return count + 1
-    list_row(problem, count + 1, len(system.rest) + r, now, -bound - had, bound - had, 0.0)
+    list_row(problem, count + 1, len(system.rest) + r, now, -bound - had, bound - had, soft)
     problem.friction[count + 1], problem.normal[count + 1] = system.friction[r], count
     return count + 2
 

@@ -9,7 +9,7 @@ from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.response.recorder import note_outputs, note_step, note_tilts, put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.system.system import FLOOR, LEFT, RIGHT
-from vanedamp.coupling.system.unit_kinematics import elongation, gap
+from vanedamp.coupling.system.unit_kinematics import elongation, gap, slider_bound
 
 #: a motion above this, in m or m/s, has no physical meaning
 _BOUND = 1e30
@@ -33,12 +33,12 @@ def copy(source, target):
 
 @inlined
 def drag_sliders(system, q):
-    """Let the sliders of Jenkins elements follow, in q, where their springs would go beyond their bounds."""
-    sliders = len(system.tangential)
-    for j in range(sliders):
-        most = system.limit[len(system.limit) - sliders + j] / system.tangential[j]
-        stretched = elongation(system, j, q)
-        q[len(q) - sliders + j] += stretched - min(max(stretched, -most), most)
+    """Let sliders follow, in q, where their springs would go beyond their bounds."""
+    for r in range(len(system.rest)):
+        j = system.slider[r]
+        if j >= 0:
+            most, stretched = slider_bound(system, r, q) / system.tangential[j], elongation(system, j, q)
+            q[len(q) - len(system.tangential) + j] += stretched - min(max(stretched, -most), most)
 
 
 @inlined

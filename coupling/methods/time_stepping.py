@@ -121,7 +121,7 @@ def loads_at(scene: Scene, system: System) -> Loads:
 
 
 def start(system: System, begun: RestartState, spring: np.ndarray, records: Records) -> tuple[System, StepState]:
-    """Return the system whose slips of Jenkins elements are those of their drivers, and its motion at time zero.
+    """Return the system whose slips are those of the drivers of sliders, and its motion at time zero.
 
     spring: (u,) as in StepState.
     """

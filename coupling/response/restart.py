@@ -42,8 +42,19 @@ def fitted(system: System, state: RestartState) -> RestartState:
     moved = before_stops(system.J[stops, : system.modes], system.rest[stops], p)
     if np.any(moved != p):
         state = replace(state, displacement=frozen(system.scale * moved))
-    most = system.grip / system.casing_spring
-    return _inside(system, replace(state, elongation=frozen(np.clip(state.elongation, -most, most))))
+    state = _inside(system, state)
+    most = elongation_bounds(system, motion_of(system, state).q)
+    return replace(state, elongation=frozen(np.clip(state.elongation, -most, most)))
+
+
+def elongation_bounds(system: System, q: np.ndarray) -> np.ndarray:
+    """Return the largest elongations (d,) of a state's springs before sliders, m, at coordinates q (N,)."""
+    most, unit = np.zeros(system.elongations), system.sprung
+    most[: system.dampers] = system.grip / system.casing_spring
+    unit = unit[unit < system.contacts]
+    force = system.friction[unit] * np.maximum(-system.spring[unit] * (system.rest[unit] + system.J[unit] @ q), 0.0)
+    most[system.dampers :] = force / system.tangential[: len(unit)]
+    return most
 
 
 def motion_of(system: System, state: RestartState) -> Coordinates:
@@ -61,15 +72,15 @@ def motion_of(system: System, state: RestartState) -> Coordinates:
             q[x] = slip[b] + floor[b]
             if system.tilt[b] >= 0:
                 q[x + 1], q[x + 2] = lift[b] + rise[b], tilt[b] + turn[b]
-    place_sliders(system, motion.q, state.elongation[_drawn(system)])
+    place_sliders(system, motion.q, state.elongation[system.drawn])
     return motion
 
 
 def state_at(system: System, motion: Coordinates) -> RestartState:
     """Return the state of coordinates (N,) and their rates."""
     n, extended = system.modes, system.tilt >= 0
-    elongation = np.zeros(system.dampers)
-    elongation[_drawn(system)] = system.elongation @ motion.q
+    elongation = np.zeros(system.elongations)
+    elongation[system.drawn] = system.elongation @ motion.q
     (slip, lift, tilt), rates = (
         (
             q[system.along] - system.floor @ q,
@@ -93,7 +104,7 @@ def _of_scene(scene: Scene, system: System) -> RestartState:
         # an initial state belongs to a rigid structure: others have none
         [scene.initial.displacement] * n, [scene.initial.velocity] * n,
         scene.positions, [damper.velocity for damper in bodies],
-        [0.0] * system.dampers, system.travels,
+        [0.0] * system.elongations, system.travels,
     )  # fmt: skip
     across = (
         [damper.lift + up for damper, up in zip(bodies, rise, strict=True)],
@@ -120,12 +131,12 @@ def _checked(system: System, state: RestartState) -> RestartState:
 def _check_size(system: System, state: RestartState) -> None:
     """Raise InputError for a state of a scene of another size, or of other bodies."""
     n, b = system.modes, system.bodies
-    sizes = (n, n, b, b, system.dampers, *4 * (b if system.in_plane else 0,))
+    sizes = (n, n, b, b, system.elongations, *4 * (b if system.in_plane else 0,))
     counts = tuple(len(getattr(state, entry.name)) for entry in fields(state) if entry.name not in ("gap", "speed"))
     if counts[:5] != sizes[:5]:
         raise InputError(
-            f"continuation: a state of {counts[0]} modes, {counts[2]} bodies and {counts[4]} friction dampers does not "
-            f"fit a scene of {n}, {b} and {system.dampers}"
+            f"continuation: a state of {counts[0]} modes, {counts[2]} bodies and {counts[4]} friction dampers and "
+            f"springs of joints does not fit a scene of {n}, {b} and {system.elongations}"
         )
     if counts != sizes:
         raise InputError(
@@ -207,8 +218,3 @@ def at_speed_of(scene: Scene, start: RestartState) -> RestartState:
     if active() is not None:
         return replace(start, **moved)
     return replace(start, **{name: frozen(part) for name, part in moved.items()}, speed=frozen([scene.speed]))
-
-
-def _drawn(system: System) -> np.ndarray:
-    """Return the numbers (j,) of the friction dampers that are Jenkins elements."""
-    return system.body[len(system.body) - len(system.tangential) :]

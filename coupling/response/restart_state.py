@@ -22,7 +22,7 @@ class RestartState:
 
     displacement, velocity: (n,) m and m/s of the structure; of a reduced model its real modes, mass-normalised
     slip, slip_velocity: (b,) m and m/s of the bodies relative to their floors
-    elongation: (d,) m of the friction dampers' springs; 0 for rigid ones
+    elongation: (d,) m of the springs of friction dampers, 0 for rigid ones, then of joints with one along
     gap: (c,) m, free travel of each contact along or across its cavity, or of each stop, which the state belongs to
     lift, lift_velocity: (b,) m and m/s across the cavity, of the bodies' centres above the floor, counted from where
     they lie flat on it; tilt, tilt_rate: (b,) rad and rad/s relative to the cavity; 0 for sliders, and empty without

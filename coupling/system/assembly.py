@@ -65,7 +65,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     if isinstance(scene.structure, Prescribed):
         table = array(list(shares.values()), complex) * -1j * scene.structure.displacement_amplitude
     casing = _casing(scene, basis, bodies[-1].coordinates.stop if bodies else n)
-    size = casing["elongation"].shape[1]
+    size = casing["casing"].shape[1]
     excited = _excitation(scene, basis, bodies, loads, forced, table, size)
     placed = _places(scene, basis, bodies, surfaces, loads, size)
     mass, holds = _mass(bodies, size), _holding(scene, loads)
@@ -74,12 +74,11 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
     for unit in contacts:
         if values(unit.closing):
             excited["weight"] = excited["weight"] - unit.closing * unit.normal
-    rubbing = friction_elements(scene, bodies, placed["floor"], holds, casing["casing"], casing["grip"])
+    rubbing = friction_elements(bodies, placed["floor"], holds, **casing)
     units = _columns([*contacts, *elements, *rubbing], size)
-    sliders = len(casing["tangential"])
-    massive = slice(size - sliders)
+    massive = slice(size - len(units["tangential"]))
     # rows of sliders are not to be small compared with others
-    pulled = (values(casing["elongation"])[:, :n] ** 2).sum(axis=1)
+    pulled = (values(units["elongation"])[:, :n] ** 2).sum(axis=1)
     mobility = (values(units["J"])[:, massive] ** 2 / values(mass)[massive]).sum(axis=1)
     mass[massive.stop :] = 1 / (np.r_[mobility, pulled].max(initial=0.0) or 1.0)
     stiffness, damping = _stiffness(scene, basis, bodies, loads, placed["floor"], size)
@@ -93,7 +92,8 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         frequency=omega * np.array(list(shares)), omega=omega, period=2 * np.pi / omega, moment=0.0, speed=0.0,
         delassus=(values(units["J"]) / values(mass)) @ values(units["J"]).T,
         restitution_at=law_address(scene.contact, values(units["restitution"])[: len(contacts)]),
-        in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
+        in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, casing=casing["casing"],
+        grip=casing["grip"], casing_spring=casing["spring"], **excited, **placed, **units,
     )  # fmt: skip
     return system if active() is not None else with_scales(system)
 
@@ -102,7 +102,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
 
 
 def _casing(scene: Scene, basis: ModalBasis, first: int) -> dict[str, Any]:
-    """Return the friction dampers. first: number of the first slider's coordinate."""
+    """Return the friction dampers; their rows have all coordinates. first: number of the first slider's."""
     dampers, at = scene.friction_damper, forced_label(scene)
     rows = [
         interface_row(basis, damper.at or at, f"friction_damper[{number}].at")
@@ -111,15 +111,10 @@ def _casing(scene: Scene, basis: ModalBasis, first: int) -> dict[str, Any]:
     ]
     grip = array([coefficient(damper.friction) * damper.normal_force for damper in dampers])
     spring = array([np.inf if damper.stiffness is None else damper.stiffness for damper in dampers])
-    jenkins = np.flatnonzero((grip > 0.0) & np.isfinite(spring))
-    casing = zeros((len(rows), first + len(jenkins)))
+    sliders = sum(element.sliders for _, _, element in scene.elements)
+    casing = zeros((len(rows), first + sliders + np.count_nonzero((grip > 0.0) & np.isfinite(spring))))
     casing[:, : len(basis.stiffness)] = array(rows).reshape(len(rows), len(basis.stiffness))
-    elongation = casing[jenkins].copy()
-    elongation[:, first:] = -np.eye(len(jenkins))
-    return {
-        "casing": casing, "grip": grip, "casing_spring": spring, "tangential": spring[jenkins],
-        "elongation": elongation,
-    }  # fmt: skip
+    return {"casing": casing, "grip": grip, "spring": spring}
 
 
 def _by_sector(scene: Scene, basis: ModalBasis) -> np.ndarray:
@@ -214,6 +209,10 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
     # arrays of their own, as all in a system: the compiled functions are compiled for the layout of their arguments
     elements = [unit.element for unit in units]
     J = array([unit.normal for unit in units] + [unit.slip for unit in units]).reshape(2 * len(units), size)
+    sprung = np.flatnonzero([values(unit.tangential) < np.inf for unit in units])
+    slider, slips, rests = np.full(len(units), -1), len(units) + sprung, np.eye(size)[size - len(sprung) :]
+    slider[sprung], elongation = np.arange(len(sprung)), J[slips] - rests
+    J[slips] = rests
     columns: dict[str, Any] = {
         name: np.array([getattr(unit, name) for unit in units], np.int64) for name in ("body", "other", "corner")
     }
@@ -222,7 +221,8 @@ def _columns(units: list[Unit], size: int) -> dict[str, Any]:
         "surface": np.array([surface_code(unit.side) for unit in units], np.int64), "J": J,
         "restitution": array([element.restitution for element in elements]),
         "spring": array([element.stiffness for element in elements]),
-        "dashpot": array([element.dashpot for element in elements]),
+        "dashpot": array([element.dashpot for element in elements]), "slider": slider, "elongation": elongation,
+        "tangential": array([units[r].tangential for r in sprung]),
     }  # fmt: skip
 
 
@@ -319,5 +319,5 @@ def loads_of(scene: Scene, signal: Waveform) -> Loads:
 
 
 def place_sliders(system: System, q: np.ndarray, elongation: np.ndarray) -> None:
-    """Place the sliders of Jenkins elements in q (N,) so that their springs have an elongation (j,), m."""
+    """Place the sliders in q (N,) so that their springs have an elongation (j,), m."""
     q[len(q) - len(elongation) :] += system.elongation @ q - elongation

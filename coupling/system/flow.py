@@ -6,8 +6,8 @@ In coordinates s = sqrt(M) q, where the mass matrix is one,
 
 with R the rows that are kept at rest (gaps of closed contacts, slips that stick) and W the directions of their forces:
 a contact that slips has its friction in the direction of its normal force, W_N - sigma mu W_T, so that P is oblique.
-Closed compliant contacts and the springs of Jenkins elements whose sliders rest are parts of K and C. A slider has no
-mass: it rests, or follows its driver.
+Closed compliant contacts and the springs of sliders at rest are parts of K and C. A slider has no mass: it rests, or
+follows its driver, at the distance by which its bound stretches the spring between them.
 """
 
 from __future__ import annotations
@@ -54,8 +54,19 @@ def mass_of(system: System, motions: np.ndarray) -> np.ndarray:
 
 
 def matrices(system: System, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return mass, damping and stiffness (k, k) of a system that has motions (N, k) only, without Jenkins elements."""
+    """Return mass, damping and stiffness (k, k) of a system that has motions (N, k) only, without sliders' springs."""
     return mass_of(system, motions), motions.T @ system.damping @ motions, motions.T @ system.stiffness @ motions
+
+
+def eased(system: System, units: np.ndarray, drag: np.ndarray) -> np.ndarray:
+    """Return the motions (m, N) of units' sliders (m,) as their bounds fall with the normal forces of contacts.
+
+    drag: (m,) friction per normal force, by the direction of slip.
+    """
+    contact = units < system.contacts
+    softness = np.where(contact, system.spring[units], 0.0) / system.tangential
+    rows: np.ndarray = (drag * softness)[:, None] * system.J[units]
+    return rows
 
 
 class StateFlow:
@@ -65,8 +76,8 @@ class StateFlow:
     its force on to its driver. rubs: (u,) whether units have friction; way: (u,) direction in which they slip, or 0;
     drag: (u,) friction per normal force.
     closed, pressed: rigid and compliant contacts with forces; touching: rigid ones that are closed; stick: units whose
-    slips are kept at rest; slides: friction elements that slip, with the forces `known`; holds, follows: Jenkins
-    elements (of j) whose sliders rest, and the others.
+    slips are kept at rest; slides: friction elements that slip, with the forces `known`; holds, follows: sliders (of j)
+    that rest, and the others; drivers: (j, N) motions by which the latter move.
     kept: (k,) rows at rest; wrench: (N, k) directions of their forces; push: (N, p) of those of compliant contacts;
     spring, dashpot: (p, N) and preload: (p,) their forces. stiffness, damping: (N, N); weight: (N,) without preload;
     load: (e, N). oblique: (N, N) accelerations by loads; carried: (k, N) forces of the kept rows by loads, the least
@@ -85,13 +96,15 @@ class StateFlow:
         self.closed, self.pressed = (np.flatnonzero(presses(state) & contact & of) for of in (~yields, yields))
         self.touching = np.flatnonzero((state != OPEN) & contact & ~yields)
         self.stick, self.slides = np.flatnonzero((state == STICK) & self.rubs), np.flatnonzero(~contact & (way != 0))
-        rests = state[u - self.sliders :] == STICK
+        sprung = system.sprung
+        rests = state[sprung] == STICK
         self.holds, self.follows = np.flatnonzero(rests), np.flatnonzero(~rests)
         self.drawn = rows.copy()
-        self.drawn[2 * u - self.sliders :] += system.elongation / root
+        self.drawn[u + sprung] += system.elongation / root
+        self.drivers = self.drawn[u + sprung] + eased(system, sprung, self.drag[sprung]) / root
         self.kept, self.known = np.concatenate([self.closed, u + self.stick]), -(way * system.limit)[self.slides]
         self.wrench = wrenches(rows, self.closed, self.drag[self.closed], self.stick)
-        self.push = wrenches(rows, self.pressed, self.drag[self.pressed], self.stick[:0])
+        self.push = wrenches(self.drawn, self.pressed, self.drag[self.pressed], self.stick[:0])
         self.spring, self.dashpot = (
             matrix[self.pressed, None] * rows[self.pressed] for matrix in (system.spring, system.dashpot)
         )
@@ -127,7 +140,8 @@ class StateFlow:
     @cached_property
     def held(self) -> np.ndarray:
         """Whether constraints hold the slip of a unit (u,), which may count as slipping."""
-        slips = self.drawn[self.u :]
+        slips = self.drawn[self.u :].copy()
+        slips[self.system.sprung] = self.drivers
         free = slips - slips @ self.inverse @ self.rows[self.kept]
         return np.asarray(np.linalg.norm(free, axis=1) <= SINGULAR * np.linalg.norm(slips, axis=1))
 
@@ -144,8 +158,8 @@ class StateFlow:
         """Return motions (N, ...) with sliders as they are: at rest, or as their drivers."""
         size, moved = len(self.root), motion.copy()
         moved[size - self.sliders :] = 0.0
-        for a, row in zip(size - self.sliders + self.follows, self.system.elongation[self.follows], strict=True):
-            moved[a] = self.root[a] * ((row / self.root)[: -self.sliders] @ motion[: -self.sliders])
+        for a, row in zip(size - self.sliders + self.follows, self.drivers[self.follows], strict=True):
+            moved[a] = self.root[a] * (row[: -self.sliders] @ motion[: -self.sliders])
         return moved
 
     def settled(self, motion: np.ndarray, terms: np.ndarray) -> np.ndarray:

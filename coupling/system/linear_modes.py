@@ -96,7 +96,7 @@ def _system(
 ) -> tuple[LinearParts, LinearModes]:
     """Return the system whose coordinates are the modes and the bodies `moving` (b,); those `held` follow their floor.
 
-    stuck: sliders of Jenkins elements hold.
+    stuck: sliders hold.
     """
     basis = attached(system, held, moving)
     for b in np.flatnonzero(moving & _rolling(scene)) if moving.any() else ():

@@ -1,10 +1,10 @@
 """The record of a scene as matrices, the same for every method: M q'' + C q' + K q = loads + J^T lambda.
 
 q = (p, bodies, sliders): real modal coordinates of the structure, mass-normalised; of each body its position x along
-its cavity and, of a planar one, y across it and its tilt; and the sliders of Jenkins elements, coordinates without
-mass. All motion is relative to the base: a prescribed motion is a structure without modes on a moving base. x and y
-count from where the bodies of a cavity stand side by side on the floor, in the middle of the free travel. Tilts are
-small: a point (a, b) of a body, from its centre, moves by (x - tilt b, y + tilt a).
+its cavity and, of a planar one, y across it and its tilt; and sliders behind springs (Jenkins elements), coordinates
+without mass. All motion is relative to the base: a prescribed motion is a structure without modes on a moving base. x
+and y count from where the bodies of a cavity stand side by side on the floor, in the middle of the free travel. Tilts
+are small: a point (a, b) of a body, from its centre, moves by (x - tilt b, y + tilt a).
 
 The excitation is a sum of e exponentials, its harmonics, and so are the loads: Re sum_h load_h exp(i frequency_h t).
 For an excitation that is no such sum, they depend on the angle (system.assembly.loads_of), whose first harmonics
@@ -51,8 +51,9 @@ class System(NamedTuple):
     """Matrices of a scene: N coordinates, n of them modes, e harmonics, u units, b bodies, d friction dampers.
 
     A unit is a contact with its normal row and its slip, or, behind the contacts, a friction element with a constant
-    limit, which has only a slip. The last j units are Jenkins elements, whose slip is their slider's; the sliders
-    are the last j coordinates. Rows (2u, N): normals first, then slips. Compiled functions take it as it is.
+    limit, which has only a slip. j units have a spring before their slip, that of a slider; the sliders are the last
+    j coordinates, in the order of the units. Rows (2u, N): normals first, then slips. Compiled functions take it as it
+    is.
     """
 
     modes: int  # n
@@ -60,7 +61,7 @@ class System(NamedTuple):
     contacts: int
     scale: float  # displacement per modal coordinate of a rigid structure, m; 1 for others
     mass: np.ndarray  # (N,) 1 for a mode; kg; kg m^2; of a slider, which has none, a scale
-    stiffness: np.ndarray  # (N, N) without the springs of Jenkins elements
+    stiffness: np.ndarray  # (N, N) without springs before sliders
     damping: np.ndarray  # (N, N)
     squares: np.ndarray  # (n,) squared undamped angular frequencies of the structure without bodies
     viscous: np.ndarray  # (n, n) damping of the structure without bodies
@@ -83,7 +84,8 @@ class System(NamedTuple):
     restitution_at: int  # address of that law (system.restitution); 0: the coefficient at every speed
     spring: np.ndarray  # (u,) stiffness of a contact that yields, N/m; inf: rigid, and friction elements
     dashpot: np.ndarray  # (u,) N s/m
-    tangential: np.ndarray  # (j,) stiffness of the springs of Jenkins elements, N/m
+    slider: np.ndarray  # (u,) int: number of the slider whose slip is the unit's, -1: none
+    tangential: np.ndarray  # (j,) stiffness of the springs before sliders, N/m
     elongation: np.ndarray  # (j, N) of these springs
     in_plane: bool  # whether bodies have an extent or springs, or impacts two phases: more than line_system holds
     two_phases: bool  # whether impacts have a phase of compression and one of expansion
@@ -133,6 +135,22 @@ class System(NamedTuple):
         return len(self.casing)
 
     @property
+    def sprung(self) -> np.ndarray:
+        """The units (j,) with sliders, in their order."""
+        return np.flatnonzero(self.slider >= 0)
+
+    @property
+    def elongations(self) -> int:
+        """Number of elongations in a state: of friction dampers, 0 of rigid ones, then of contacts with sliders."""
+        return self.dampers + int(np.count_nonzero(self.slider[: self.contacts] >= 0))
+
+    @property
+    def drawn(self) -> np.ndarray:
+        """Places (j,) of the sliders' elongations in a state."""
+        unit, contact = self.sprung, self.sprung < self.contacts
+        return np.where(contact, self.dampers + self.slider[unit], self.body[unit])
+
+    @property
     def without_body(self) -> np.ndarray:
         """Whether each unit (u,) moves no body: it is between points of the structure, or one and the ground."""
         bodies = slice(self.modes, len(self.mass) - len(self.tangential))
@@ -162,9 +180,9 @@ class System(NamedTuple):
 
 
 def on_structure(system: System) -> System:
-    """Return the system whose slips of Jenkins elements follow their drivers, instead of their sliders."""
+    """Return the system whose slips follow the drivers of sliders, instead of these."""
     if not len(system.tangential):
         return system
     J = system.J.copy()
-    J[-len(system.tangential) :] += system.elongation
+    J[len(system.rest) + system.sprung] += system.elongation
     return system._replace(J=J, delassus=(J / system.mass) @ J.T)

@@ -81,8 +81,30 @@ def is_closed(system, st, unit):
 
 @inlined
 def elongation(system, j, q):
-    """Return the elongation of the spring of a Jenkins element, m; of velocities, its rate."""
+    """Return the elongation of the spring before a slider, m; of velocities, its rate."""
     total = 0.0
     for i in range(len(q)):
         total += system.elongation[j, i] * q[i]
     return total
+
+
+@inlined
+def slider_bound(system, unit, q):
+    """Return the largest force of the spring before a unit's slider at coordinates q, N."""
+    most = system.limit[unit]
+    if unit < system.contacts:
+        most += system.friction[unit] * max(-system.spring[unit] * gap(system, unit, q), 0.0)
+    return most
+
+
+@inlined
+def slider_speed(system, unit, state, v):
+    """Return the speed of a unit's slider that follows its driver, m/s; of accelerations, its acceleration.
+
+    One that slips does so at its bound: as the normal force falls, its spring shortens.
+    """
+    j = system.slider[unit]
+    speed = elongation(system, j, v) + row_speed(system, len(system.rest) + unit, v)
+    if unit < system.contacts and is_slip(state):
+        speed += state * system.friction[unit] * system.spring[unit] * row_speed(system, unit, v) / system.tangential[j]
+    return speed

@@ -2,8 +2,8 @@
 
 A contact is a normal row, its gap, and a slip row with a coefficient of friction; a friction element is a slip row with
 a constant limit: the floor under a body that only slides, or a friction damper between structure and casing. Contacts
-come first, cavity by cavity from left to right, then contacts of stops and other elements; of the friction elements,
-Jenkins elements come last.
+come first, cavity by cavity from left to right, then contacts of stops and other elements. A slip may have a spring and
+a slider behind it (of a friction element: a Jenkins element, which come last).
 
 A body whose height is known lies in a cavity that turns by theta: a point at the height y above the floor meets walls
 that move by u - theta y where the floor moves by u.
@@ -11,7 +11,7 @@ that move by u - theta y where the floor moves by u.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +29,8 @@ from vanedamp.files.toml_input import InputError
 
 #: smaller coefficients of friction are treated as zero: their forces are lost in the round-off of others
 _SMOOTH = 1e-9
+#: singular values of normals below which they depend on each other
+_ONE = 1e-9
 #: mobility (1/kg) of a point that the first mode does not move
 _LIGHT = 1e-30
 
@@ -228,8 +230,12 @@ class ElementParts(NamedTuple):
 
     def contact(self, normal: np.ndarray, restitution: float, *labels: str | None) -> Element:
         """Return the scene's contact of a row between points of the structure."""
-        yields = sum(self.law.basis.flexibility({label or self.label: 1.0}) for label in labels)
+        yields = sum(self.flexibility({label or self.label: 1.0}) for label in labels)
         return self.law.element(normal, restitution, yields)
+
+    def flexibility(self, shares: Mapping[str, float]) -> float:
+        """Return the residual flexibility of a weighted sum of interface labels, m/N."""
+        return self.law.basis.flexibility(shares)
 
     def travel(self, normal: np.ndarray) -> float:
         """Return how far a row of the structure moves, m, at least the smallest number."""
@@ -250,8 +256,22 @@ def element_units(scene: Scene, parts: ElementParts) -> Iterator[Unit]:
 
 
 def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
-    """Raise InputError for a friction with which a single contact may jam or have two motions (Painleve 1895)."""
+    """Raise InputError for friction by which a motion is not unique.
+
+    That of a single contact that may jam or have two motions (Painleve 1895), and that of rigid contacts of the
+    structure closed at rest whose normal forces the equations do not tell apart: joints all round a ring would lose
+    their preload to each other.
+    """
+    at_rest = [u for u in contacts if u.friction > 0.0 and u.rest <= 0.0 and u.other < 0 and u.side not in SIDES]
+    rows = [unit.normal / np.linalg.norm(unit.normal) for unit in at_rest if np.isinf(unit.element.stiffness)]
+    if len(rows) > 1 and np.linalg.matrix_rank(rows, tol=_ONE) < len(rows):
+        raise InputError(
+            f"{at_rest[0].side}: the modes do not tell the normal forces of the rigid ones apart, which friction needs; "
+            "give normal_stiffness"
+        )
     for unit in contacts:
+        if np.isfinite(unit.element.stiffness):  # its force is that of its spring
+            continue
         normal = (unit.normal**2 / mass).sum()
         coupled = abs((unit.normal * unit.slip / mass).sum())
         if unit.friction > 0.0 and unit.friction * coupled >= normal:
@@ -267,11 +287,11 @@ def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
 
 
 def friction_elements(
-    scene: Scene, bodies: list[Body], floor: np.ndarray, holds: np.ndarray, casing: np.ndarray, grip: np.ndarray
+    bodies: list[Body], floor: np.ndarray, holds: np.ndarray, casing: np.ndarray, grip: np.ndarray, spring: np.ndarray
 ) -> Iterator[Unit]:
-    """Yield the friction elements: floors under bodies that only slide, rigid friction dampers, then Jenkins elements.
+    """Yield the friction elements: floors under bodies that only slide, rigid friction dampers, those with springs.
 
-    floor (b, N), holds (b,), casing (d, N), grip (d,): as in System. Elements without a limit do not count.
+    floor (b, N), holds (b,), casing (d, N), grip, spring (d,): as in System. Elements without a limit do not count.
     """
     none = zeros(floor.shape[1])
     for body in bodies:
@@ -279,14 +299,10 @@ def friction_elements(
             slip = -floor[body.number]
             slip[body.x] += 1.0
             yield Unit(none, slip, body=body.number, side="floor", limit=scalar(holds[body.number]))
-    rubbing = np.flatnonzero(grip > 0.0)
-    jenkins = [number for number in rubbing if scene.friction_damper[number].stiffness is not None]
-    for number in rubbing:
-        if number not in jenkins:
-            yield Unit(none, casing[number], body=int(number), limit=scalar(grip[number]))
-    sliders = np.eye(len(none))[len(none) - len(jenkins) :]
-    for number, slider in zip(jenkins, sliders, strict=True):
-        yield Unit(none, slider, body=int(number), limit=scalar(grip[number]))
+    for number in sorted(np.flatnonzero(grip > 0.0), key=lambda number: bool(spring[number] < np.inf)):
+        yield Unit(
+            none, casing[number], body=int(number), limit=scalar(grip[number]), tangential=scalar(spring[number])
+        )
 
 
 def coefficient(friction: float) -> float:

@@ -279,8 +279,8 @@ def _handle_event(system, flows, st, rec, scratch, r, event):
     _begin_contacts(system, st, rec)
     if not _decide_states(system, st, rec, scratch):
         return False
-    has_spring = is_compliant(system, r) or system.contacts <= r < len(system.rest) - len(system.tangential)
-    if has_spring and (event == AT_LOW or event == AT_HIGH) and scratch.attempt[0] > 0 and st.state[r] == STICK:
+    known = system.slider[r] < 0 and (is_compliant(system, r) or r >= system.contacts)
+    if known and (event == AT_LOW or event == AT_HIGH) and scratch.attempt[0] > 0 and st.state[r] == STICK:
         # again and again: the decision's force is short of its known bound by round-off, that of the motion is not
         st.state[r] = SLIP_RIGHT if event == AT_LOW else SLIP_LEFT
         st.other[r] = st.state[r]
@@ -294,7 +294,6 @@ def _handle_event(system, flows, st, rec, scratch, r, event):
 @inlined
 def _change_unit(system, st, rec, r, event):
     """Change the state of unit r by its event."""
-    elements = len(system.rest) - len(system.tangential)  # the first Jenkins element
     at_bound = event == AT_LOW or event == AT_HIGH
     if event == CLOSES:
         _close_gap(system, st, r)
@@ -306,9 +305,9 @@ def _change_unit(system, st, rec, r, event):
     elif event == RECLOSES:
         st.state[r] = SLIP_RIGHT  # decided next; the ledger has taken the energy that the spring has
         st.ledger[CONTACT] -= 0.5 * system.spring[r] * gap(system, r, st.q) ** 2
-    elif r >= elements and at_bound:
+    elif system.slider[r] >= 0 and at_bound:
         st.state[r] = SLIP_RIGHT if event == AT_LOW else SLIP_LEFT  # decided next: its spring is at its bound
-    elif event == STOPS and r < elements:
+    elif event == STOPS and system.slider[r] < 0:
         # the slip within the resolution of time is rest
         st.scale[0] = max(st.scale[0], abs(row_speed(system, len(system.rest) + r, st.v)) / AT_REST)
 
@@ -423,7 +422,9 @@ def _forces_suffice(system, flows, st):
         differs = differs or st.state[r] != st.other[r]
     if not differs:
         return True
-    for r in range(u - len(system.tangential)):
+    for r in range(u):
+        if system.slider[r] >= 0 and st.state[r] < OPEN:
+            continue
         if is_rigid(system, r) and st.state[r] < OPEN and _violates(system, flows, st, r, 1.0, 0.0):
             return False
         if st.state[r] == STICK:
@@ -575,7 +576,7 @@ def _begin_segment(system, flows, st):
 
 @inlined
 def _spring_energy(system, st):
-    """Return the energy in the springs of closed contacts and of Jenkins elements, J."""
+    """Return the energy in the springs of closed contacts and before sliders, J."""
     energy = 0.0
     for r in range(system.contacts):
         if is_compliant(system, r) and st.state[r] < OPEN:

@@ -23,6 +23,8 @@ from vanedamp.coupling.system.unit_kinematics import (
     is_slip,
     least_force,
     row_speed,
+    slider_bound,
+    slider_speed,
     spring_force,
 )
 
@@ -31,8 +33,6 @@ _SOONER = 0.1
 _NORMAL, _SLIP = 1, 2
 #: states of a compliant contact that touches without speed
 _TOUCHES, _PRESSES, _OPENS = 1, 2, 3
-#: of a Jenkins element: its spring is at its bound, its driver at rest
-_AT_BOUND = 4
 
 
 @kernel
@@ -69,62 +69,70 @@ def free_acceleration(system, scratch, q, v, time):
 @kernel
 def move_sliders(system, state, q, v):
     """Bring sliders to their positions: at rest, or behind their drivers by their springs."""
-    sliders, size = len(system.tangential), len(q)
-    for j in range(sliders):
-        r, a = len(system.rest) - sliders + j, size - sliders + j
+    for r in range(len(system.rest)):
+        j = system.slider[r]
+        if j < 0:
+            continue
+        a = len(q) - len(system.tangential) + j
         v[a] = 0.0
         if state[r] != STICK:
-            q[a] += elongation(system, j, q) - state[r] * system.limit[r] / system.tangential[j]
-            v[a] = elongation(system, j, v)
+            q[a] += elongation(system, j, q)
+            if is_slip(state[r]):
+                q[a] -= state[r] * slider_bound(system, r, q) / system.tangential[j]
+            v[a] = slider_speed(system, r, state[r], v)
 
 
 @kernel
-def _hold_sliders(system, st, scratch, slow):
-    """Decide which sliders rest, and which move: those whose springs are at their bounds.
+def _hold_slider(system, st, scratch, r, slow):
+    """Decide whether a unit's slider rests, or moves: its spring is at its bound.
 
-    One whose spring is at its bound while its driver is at rest is marked: its acceleration decides. Sliders that
-    have moved until now are at their bounds.
+    One whose spring is at its bound while its driver is at rest is marked: its acceleration decides. A slider that
+    has moved until now is at its bound. Without a bound, as a contact begins to press, it goes as its driver does.
     """
-    sliders, size = len(system.tangential), len(st.q)
-    for j in range(sliders):
-        r, stretched, terms, speed = len(system.rest) - sliders + j, 0.0, 0.0, 0.0
-        for i in range(size):
-            term = system.elongation[j, i] * st.q[i]
-            stretched += term
-            terms += abs(term)
-        for i in range(size - sliders):
-            speed += system.elongation[j, i] * st.v[i]
-        most, way = system.limit[r] / system.tangential[j], SLIP_RIGHT if stretched > 0.0 else SLIP_LEFT
-        at_bound = abs(stretched) >= most - NEAR_BOUND * most - NEAR_BOUND_TERMS * terms
-        if is_slip(st.state[r]):
-            at_bound, way = True, st.state[r]
-        st.state[r], scratch.sliding[r], scratch.resting[r] = STICK, 0, 0
-        if at_bound and way * speed >= -slow:
-            st.state[r] = way
-            scratch.resting[r] = _AT_BOUND if way * speed <= slow else 0
-    if len(system.tangential) > 0:
-        move_sliders(system, st.state, st.q, st.v)
+    j, stretched, terms = system.slider[r], 0.0, 0.0
+    for i in range(len(st.q)):
+        term = system.elongation[j, i] * st.q[i]
+        stretched += term
+        terms += abs(term)
+    most = slider_bound(system, r, st.q) / system.tangential[j]
+    if r < system.contacts:
+        room = abs(system.rest[r])
+        for i in range(len(st.q)):
+            room += abs(system.J[r, i] * st.q[i])
+        terms += system.friction[r] * system.spring[r] / system.tangential[j] * room
+    at_bound = abs(stretched) >= most - NEAR_BOUND * most - NEAR_BOUND_TERMS * terms
+    way = SLIP_RIGHT if stretched > 0.0 else SLIP_LEFT
+    if most <= NEAR_BOUND_TERMS * terms:
+        way = SLIP_RIGHT if slider_speed(system, r, STICK, st.v) > 0.0 else SLIP_LEFT
+    elif is_slip(st.state[r]):
+        at_bound, way = True, st.state[r]
+    st.state[r], scratch.at_bound[r] = STICK, 0
+    if at_bound:
+        speed = way * slider_speed(system, r, way, st.v)
+        if speed >= -slow:
+            st.state[r], scratch.at_bound[r] = way, 1 if speed <= slow else 0
 
 
 @kernel
 def _draw_sliders(system, st, scratch, nothing):
     """Decide by accelerations whether drivers at rest draw their sliders on. Returns how many stay in doubt, drawn."""
-    u, sliders, doubts = len(system.rest), len(system.tangential), 0
-    for j in range(sliders):
-        r, acceleration, mobility = u - sliders + j, 0.0, 0.0
-        if scratch.resting[r] != _AT_BOUND:
+    u, doubts, total = len(system.rest), 0, scratch.drawn
+    for r in range(u):
+        if scratch.at_bound[r] == 0:
             continue
-        for i in range(len(st.q) - sliders):
-            total = scratch.free[i]
+        j, mobility = system.slider[r], 0.0
+        for i in range(len(st.q) - len(system.tangential)):
+            total[i] = scratch.free[i]
             for row in range(2 * u):
-                total += system.J[row, i] * scratch.impulse[row] / system.mass[i]
-            acceleration += system.elongation[j, i] * total
+                total[i] += system.J[row, i] * scratch.impulse[row] / system.mass[i]
             mobility += system.elongation[j, i] * system.elongation[j, i] / system.mass[i]
-        acceleration *= st.state[r]
+        if scratch.bound[r] <= 0.0:
+            st.state[r] = SLIP_RIGHT if slider_speed(system, r, STICK, total) > 0.0 else SLIP_LEFT
+        acceleration = st.state[r] * slider_speed(system, r, st.state[r], total)
         if abs(acceleration) <= nothing * math.sqrt(mobility):
             doubts += 1
         else:
-            scratch.resting[r] = 0
+            scratch.at_bound[r] = 0
             st.state[r] = STICK if acceleration < 0.0 else st.state[r]
     return doubts
 
@@ -192,18 +200,17 @@ def decide(system, st, scratch, scale):
 
     scale: the speeds in the scene, m/s, whose round-off counts as rest.
     """
-    sliders, slow = len(system.tangential), AT_REST * scale
-    if len(system.tangential) > 0:
-        _hold_sliders(system, st, scratch, slow)
-    count, decided = ZERO, sliders == 0
-    for r in range(len(system.rest) - sliders):
+    count, decided, slow = ZERO, True, AT_REST * scale
+    for r in range(len(system.rest)):
         if _is_undecided(system, st, scratch, r, slow):
             scratch.listed[count], scratch.way[count] = (
                 r,
                 direction(system, st, r, slow) if has_friction(system, r) else 0,
             )
             count += 1
-        decided = decided and count == 0 and scratch.resting[r] == 0
+        decided = decided and count == 0 and scratch.resting[r] == 0 and scratch.at_bound[r] == 0
+    if len(system.tangential) > 0:
+        move_sliders(system, st.state, st.q, st.v)
     if decided:  # gaps and speeds have decided all
         for row in range(len(scratch.impulse)):
             scratch.impulse[row] = 0.0
@@ -237,10 +244,13 @@ def direction(system, st, r, slow):
 @inlined
 def _is_undecided(system, st, scratch, r, slow):
     """Whether forces decide the state of a unit. Otherwise gap and speeds do, and it is set."""
-    scratch.sliding[r], scratch.resting[r] = 0, 0
+    scratch.sliding[r], scratch.resting[r], scratch.at_bound[r] = 0, 0, 0
+    if is_compliant(system, r) and not _is_pressed(system, st, scratch, r, slow):
+        return False
+    if system.slider[r] >= 0:
+        _hold_slider(system, st, scratch, r, slow)
+        return False
     if is_compliant(system, r):
-        if not _is_pressed(system, st, scratch, r, slow):
-            return False
         way = direction(system, st, r, slow)
         if not has_friction(system, r):
             st.state[r] = SLIP_RIGHT

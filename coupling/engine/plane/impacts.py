@@ -293,8 +293,10 @@ def stop_wedged(system, st, rec, scratch):
 def _accelerate(system, st, scratch):
     """Set accelerations of the rows (scratch.speed) without contact forces. Returns the speed they give in CHATTER."""
     u, largest = len(system.rest), 0.0
-    for r in range(u - len(system.tangential)):
+    for r in range(u):
         scratch.sliding[r] = 0
+        if system.slider[r] >= 0:
+            continue
         if r >= system.contacts or (is_compliant(system, r) and has_friction(system, r) and st.state[r] < OPEN):
             scratch.sliding[r] = direction(system, st, r, AT_REST * st.scale[0])
     loaded_acceleration(system, st, scratch, st.q, st.v, st.time[0])

@@ -9,11 +9,11 @@ from vanedamp.coupling.engine.plane.automaton import advance, begin
 from vanedamp.coupling.engine.plane.flow_assembly import fill, is_in_states
 from vanedamp.coupling.engine.plane.tracing import note_event, note_segment
 from vanedamp.coupling.engine.scenes import ON, PLACE, copy, run_scene, take_numbers, take_scene
-from vanedamp.coupling.numerics.codes import DONE, LEAVING, OPEN, SLIP_RIGHT
+from vanedamp.coupling.numerics.codes import DONE, LEAVING, OPEN, SLIP_RIGHT, STICK
 from vanedamp.coupling.numerics.compiler.jit import ZERO, entry, kernel, strict
 from vanedamp.coupling.numerics.compiler.record import changed
 from vanedamp.coupling.numerics.tolerances import SIMULTANEOUS
-from vanedamp.coupling.system.unit_kinematics import gap, is_compliant
+from vanedamp.coupling.system.unit_kinematics import elongation, gap, is_compliant
 
 
 @entry
@@ -89,11 +89,9 @@ def _leave(system, flows, st, scratch, columns, k):
             columns.lift[k, b], columns.lift_velocity[k, b] = _relative(system.rise[b], st, x + 1)
             columns.tilt[k, b], columns.tilt_rate[k, b] = _relative(system.turn[b], st, x + 2)
     columns.elongation[k, :] = 0.0
-    for j in range(len(system.tangential)):
-        stretch = 0.0
-        for i in range(len(st.q)):
-            stretch += system.elongation[j, i] * st.q[i]
-        columns.elongation[k, _damper(system, j)] = stretch
+    for r in range(len(st.state)):
+        if system.slider[r] >= 0:
+            columns.elongation[k, _place_of(system, r)] = elongation(system, system.slider[r], st.q)
 
 
 @kernel
@@ -107,9 +105,9 @@ def _relative(carrier, st, x):
 
 
 @strict
-def _damper(system, j):
-    """Return the number of the friction damper that is Jenkins element j."""
-    return system.body[len(system.body) - len(system.tangential) + j]
+def _place_of(system, r):
+    """Return the place of the elongation of a unit with a slider (System.drawn)."""
+    return len(system.casing) + system.slider[r] if r < system.contacts else system.body[r]
 
 
 @strict
@@ -135,11 +133,10 @@ def _set_start(system, st, watched, columns, k):
         if system.tilt[b] >= 0:
             _place(system.rise[b], st, n, x + 1, columns.lift[k, b], columns.lift_velocity[k, b])
             _place(system.turn[b], st, n, x + 2, columns.tilt[k, b], columns.tilt_rate[k, b])
-    for j in range(sliders):
-        stretch = 0.0
-        for i in range(size - sliders):
-            stretch += system.elongation[j, i] * st.q[i]
-        st.q[size - sliders + j] = stretch - columns.elongation[k, _damper(system, j)]
+    for r in range(len(st.state)):
+        j = system.slider[r]
+        if j >= 0:
+            st.q[size - sliders + j] = elongation(system, j, st.q) - columns.elongation[k, _place_of(system, r)]
     for r in range(len(st.state)):
         shift, speed = system.rest[r], 0.0
         for i in range(size):
@@ -149,6 +146,8 @@ def _set_start(system, st, watched, columns, k):
         if system.spring[r] < math.inf and shift < -SIMULTANEOUS * system.play[r]:
             pushes = system.spring[r] * shift + system.dashpot[r] * speed < 0.0
             st.state[r] = SLIP_RIGHT if pushes else LEAVING
+            if system.slider[r] >= 0:
+                st.state[r] = STICK
 
 
 @strict

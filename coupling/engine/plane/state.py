@@ -91,6 +91,8 @@ class PlanarScratch(NamedTuple):
     doubt: np.ndarray  # (u,) int: doubtful now
     sliding: np.ndarray  # (u,) int: direction in which a unit slides whose friction is known
     resting: np.ndarray  # (u,) int: whether a compliant contact touches without speed, and its state then
+    at_bound: np.ndarray  # (u,) int: whether the spring of a slider is at its bound while its driver is at rest
+    drawn: np.ndarray  # (N,) accelerations
     span: np.ndarray  # (N, N) orthonormal basis of rows
     lemke: Lemke
     split: Lemke  # the problem with friction split in two (friction_problem._solve_split)
@@ -136,14 +138,15 @@ def new_event_functions(system: System, modes: int) -> PlanarEventFunctions:
 def new_scratch(system: System, modes: int) -> PlanarScratch:
     """Return scratch space for a scene."""
     u, size = len(system.rest), len(system.mass)
-    integers, waves = iter(np.zeros((11, u), np.int64)), iter(np.zeros((7, modes), complex))
+    integers, waves = iter(np.zeros((12, u), np.int64)), iter(np.zeros((7, modes), complex))
     return PlanarScratch(
         free=np.zeros(size), terms=np.zeros(size), later=np.zeros((2, size)), speed=np.zeros(2 * u),
         before_impact=np.zeros(2 * u), impulse=np.zeros(2 * u), compression=np.zeros(2 * u), compressed=np.zeros(2 * u),
         least=np.zeros(u), bound=np.zeros(u), before=next(integers), listed=next(integers),
         way=next(integers), slips=next(integers), place=next(integers), verdict=next(integers),
         doubtful=next(integers), first=next(integers), doubt=next(integers),
-        sliding=next(integers), resting=next(integers),
+        sliding=next(integers), resting=next(integers), at_bound=next(integers),
+        drawn=np.zeros(size),
         span=np.zeros((size, size)), lemke=new_lemke(3 * u),
         split=new_lemke(4 * u), part=np.zeros(4 * u, np.int64), column=np.zeros(4 * u, np.int64),
         attempt=np.zeros(1, np.int64),

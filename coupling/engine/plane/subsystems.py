@@ -30,7 +30,8 @@ from vanedamp.coupling.system.unit_laws import SINGULAR
 
 #: parts of a system that decide its subsystems, with friction of what slips and gaps of springs that push
 _DECIDING = (
-    "mass", "stiffness", "damping", "J", "spring", "dashpot", "elongation", "tangential", "weight", "contacts",
+    "mass", "stiffness", "damping", "J", "spring", "dashpot", "elongation", "tangential", "slider", "weight",
+    "contacts",
 )  # fmt: skip
 
 
@@ -54,8 +55,8 @@ class PlanarSubsystems(NamedTuple):
     pushed: Annotated[np.ndarray, "k q N"]  # accelerations of stretches by loads
     elastic: Annotated[np.ndarray, "k N q"]  # loads by stretches
     viscous: Annotated[np.ndarray, "k N q"]  # and by their rates
-    springs: Annotated[np.ndarray, "k", bool]  # whether contacts or Jenkins elements add some
-    slide: Annotated[np.ndarray, "k"]  # largest frequency of a Jenkins element's spring, rad/s
+    springs: Annotated[np.ndarray, "k", bool]  # whether contacts or sliders at rest add some
+    slide: Annotated[np.ndarray, "k"]  # largest frequency of a spring before a slider, rad/s
 
     # motions and forces by loads
     oblique: Annotated[np.ndarray, "k N N"]  # accelerations

@@ -51,7 +51,7 @@ RANK = 1e-12
 #: frequencies of modes, times the excitation's, outside of which runs are rejected: displacements would be quotients of
 #: round-off below, and following the motion would not end above
 SLOWEST, FASTEST = 1e-6, 1e6
-#: frequency of a Jenkins element's spring, times the excitation's, beyond which its force would be round-off
+#: frequency of a spring before a slider, times the excitation's, beyond which its force would be round-off
 STIFFEST = 1e4
 #: ratio of frequencies above which modes are refined by Newton's method, and its largest step, times a mode
 APART, REFINED = 30.0, 1e-6

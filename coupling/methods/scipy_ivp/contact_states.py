@@ -69,7 +69,7 @@ def decide(
     """Return the motion that begins at an extended state (extent,), and the orders of its event functions' zeros.
 
     None if no states are possible. Negligible gaps and speeds are zero. motions: the motion of states; sizes:
-    (extent,) of the state's terms; present: (u,) states so far; slow: speed below which a Jenkins element sticks, m/s.
+    (extent,) of the state's terms; present: (u,) states so far; slow: speed below which a slider sticks, m/s.
     """
     gaps, speed = now[free.d], now[free.s]
     options, begin = [], []

@@ -49,8 +49,9 @@ class Wrong(NamedTuple):
 class Unforced:
     """A system without forces of its contacts, on the extended state: size of z, extent, slices, accelerations.
 
-    Those of the springs of Jenkins elements are in it: they do not depend on whether their sliders, the last units
-    (sprung (u,)), move. pull (j, extent): their forces on their drivers. The sliders' speeds in the state are zero.
+    Those of springs before sliders are in it: they do not depend on whether the sliders, of units sprung (u,), move.
+    pull (j, extent): their forces on their drivers; ease (u,): how far a slider that slips moves on as the gap opens,
+    in the direction of slip. The sliders' speeds in the state are zero.
     gap (u, extent), speed (2u, extent): of the units; push (u, extent): forces of contacts that yield; relative
     (2u, extent): accelerations of the rows.
     """
@@ -67,7 +68,7 @@ class Unforced:
         forces[:, self.q], forces[:, self.v] = -system.stiffness, -system.damping
         forces[:, self.one] = system.weight
         sliders = len(system.tangential)
-        self.sliders, self.sprung = self.q.stop - sliders, np.arange(u) >= u - sliders
+        self.sliders, self.sprung = self.q.stop - sliders, system.slider >= 0
         self.pull = np.zeros((sliders, self.extent))
         self.pull[:, self.q] = -system.tangential[:, None] * system.elongation
         forces[: self.sliders] += system.elongation[:, : self.sliders].T @ self.pull
@@ -81,6 +82,8 @@ class Unforced:
         self.rubs = rubs(system)
         self.gap, self.speed = np.eye(self.extent)[self.d], np.eye(self.extent)[self.s]
         spring = np.where(self.soft, system.spring, 0.0)
+        self.ease = np.zeros(u)
+        self.ease[self.sprung] = (system.friction * spring)[self.sprung] / system.tangential
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
         self.extends = self.rigid & ~system.without_body  # whether a rigid contact is of a planar body
         self.extends[self.extends] = system.tilt[system.body[self.extends]] >= 0
@@ -102,16 +105,20 @@ class Unforced:
         return touch
 
     def ways_of_slider(self, r: int, now: np.ndarray, sizes: np.ndarray, speed: float, slow: float) -> list[int]:
-        """Return the states that a Jenkins element (unit r) may have: its slider moves with its spring at its bound.
+        """Return the states that a unit with a slider may have, which moves with its spring at its bound.
 
         now, sizes: (extent,) the state and its terms; speed: of its driver, m/s.
         """
-        pull = self.pull[r - self.u]
-        force, limit = float(pull @ now), self.system.limit[r]
-        way = slip_towards(-force)
-        if abs(force) < limit - ROUND_OFF * (limit + float(np.abs(pull) @ sizes)) or way * speed < -slow:
+        pull, room = self.pull[self.system.slider[r]], self.system.friction[r] * self.push[r]
+        force, limit = float(pull @ now), self.system.limit[r] + max(float(room @ now), 0.0)
+        noise = ROUND_OFF * (limit + float((np.abs(pull) + np.abs(room)) @ sizes))
+        if abs(force) < limit - noise:
             return [STICK]
-        return [way] if way * speed > slow else [STICK, way]
+        way = slip_towards(-force) if limit > noise else slip_towards(speed)
+        speed = way * speed + self.ease[r] * float(self.speed[r] @ now)
+        if speed < -slow:
+            return [STICK]
+        return [way] if speed > slow else [STICK, way]
 
 
 class Holding:
@@ -158,14 +165,15 @@ class LinearMotion:
         self.pressed = free.soft & presses(state)
         force = np.zeros((2 * u, free.extent))
         force[:u][self.pressed] = free.push[self.pressed]
-        force[u:] = -way * system.friction[:, None] * force[:u]
+        force[u:] = -way * np.where(free.sprung, 0.0, system.friction)[:, None] * force[:u]
         force[u:, free.one] -= np.where(free.contact | free.sprung, 0.0, way[:, 0] * system.limit)
         pushed = free.relative[holding.kept] + system.delassus[holding.kept] @ force
         force += holding.spread(-holding.inverse @ pushed, u)
         self.rate = np.zeros((free.extent, free.extent))
         self.rate[free.q, free.v] = np.eye(free.n)
         drawn = free.sprung & (state != STICK)
-        self.rate[free.sliders + np.flatnonzero(drawn[free.sprung]), free.v] = free.slip[drawn]
+        eased = (way[:, 0] * free.ease)[drawn, None] * free.normal[drawn]
+        self.rate[free.sliders + system.slider[drawn], free.v] = free.slip[drawn] + eased
         self.rate[free.v] = free.accelerations + free.respond @ force
         self.rate[free.d], self.rate[free.s] = free.speed[:u], free.relative + system.delassus @ force
         self.rate[free.s][holding.kept] = 0.0
@@ -182,10 +190,11 @@ class LinearMotion:
     def _watch(self, free: Unforced) -> None:
         """Set the event functions of all units, in their order, and their messages where negative."""
         system, way, one = free.system, ways(self.state), np.eye(free.extent)[free.one]
-        events, self.wrong = possible_events(system, self.state), list[Wrong]()
+        events, self.wrong, speed = possible_events(system, self.state), list[Wrong](), free.speed.copy()
+        speed[free.u :] += (way * free.ease)[:, None] * free.speed[: free.u]  # of sliders
         self.guard = np.zeros((len(events), free.extent))
         for guard, (r, event) in zip(self.guard, events, strict=True):
-            signals = signals_of(r, free.gap, free.speed, self.force, one)
+            signals = signals_of(r, free.gap, speed, self.force, one)
             guard[:] = event.function(event.factors(system, r, way[r]), signals)
             self.wrong.append(Wrong(r, event.after))
         self._sizes = np.abs(self.guard)

@@ -117,7 +117,7 @@ class Recorder:
         largest = np.abs(system.J).max(axis=0, initial=0.0)
         largest = np.where(largest > 0, largest, np.abs(system.response))
         position = reach / np.where(largest > 0, largest, 1.0)
-        mass = float(system.mass[system.along].sum())
+        mass = float(system.mass[system.along].sum()) or 1 / float(np.diag(system.delassus).max(initial=0.0) or 1.0)
         momentum, energy = (max(mass * size, 1e-300) for size in (omega * reach, (omega * reach) ** 2))
         integrals = np.full(self.count, energy)
         integrals[_SQUARE] = reach**2 / omega
@@ -244,7 +244,7 @@ class Recorder:
         ledger = np.zeros(len(ENERGIES))
         ledger[[EXCITATION, VISCOUS, FRICTION]] = integrals[[_EXCITATION, _VISCOUS, _FRICTION]]
         ledger[CONTACT], ledger[IMPACT_LOSS] = integrals[_CONTACT] + self.spring_loss, self.impact_loss
-        # Jenkins elements' energy is in their springs, or lost
+        # what sliders' springs have taken is in them, or lost
         springs = 0.5 * float(system.tangential @ (system.elongation @ q) ** 2)
         ledger[FRICTION] -= springs
         pressed = self.soft[presses(self.state[self.soft])]

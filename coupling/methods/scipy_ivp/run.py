@@ -323,7 +323,7 @@ class IvpRun:
         forces = np.zeros(2 * free.u)
         pressed = free.soft & (self.state != OPEN)
         forces[: free.u][pressed] = np.maximum(free.push[pressed] @ now, 0.0)
-        bounds = np.where(free.contact, system.friction * forces[: free.u], np.where(free.sprung, 0.0, system.limit))
+        bounds = np.where(free.sprung, 0.0, system.limit + system.friction * forces[: free.u])
         forces[free.u :] = -bounds * np.sign(free.slip @ v)
         leaving = closed[free.normal[closed] @ v > 0.0]
         rebounds = restitutions_at(system, leaving, free.normal[leaving] @ v)

@@ -18,7 +18,8 @@ class Unit(NamedTuple):
     friction; a friction element has a slip row and a constant limit. body: number of the body that it moves, or of its
     own entry where it moves none; play: 0 of an element for its gap at rest or how far it moves, the larger; side: name
     of what it meets, which assembly sets to the name of an element's table; closing: constant load across, N, which its
-    force balances at rest.
+    force balances at rest; tangential: stiffness of a spring between the slip and a slider without mass, which slips in
+    its place, N/m; inf: none.
     """
 
     normal: np.ndarray
@@ -33,6 +34,7 @@ class Unit(NamedTuple):
     limit: float = 0.0
     other: int = -1
     closing: float = 0.0
+    tangential: float = np.inf
 
 
 class Parts(Protocol):
@@ -54,6 +56,9 @@ class Parts(Protocol):
     def contact(self, normal: np.ndarray, restitution: float, *labels: str | None) -> Element:
         """Return the scene's contact of a normal row, between points of the structure: how it rebounds or yields."""
 
+    def flexibility(self, shares: Mapping[str, float]) -> float:
+        """Return what the modes lack of the static flexibility of a weighted sum of interface labels, m/N."""
+
     def travel(self, normal: np.ndarray) -> float:
         """Return how far a row of the structure moves under the static loads and the initial motion, m."""
 
@@ -72,6 +77,11 @@ class SceneElement:
     yields: ClassVar[bool] = False
     #: whether it has friction, which only the engine for the plane and methods for it take from an element
     rubs: ClassVar[bool] = False
+
+    @property
+    def sliders(self) -> int:
+        """Number of its units that have a spring along (Unit.tangential)."""
+        return 0
 
     def labels(self) -> Mapping[str, str | None]:
         """Return the interface labels that it names, by their keys."""

@@ -50,6 +50,11 @@ class Joint(SceneElement):
     """distance across the joint at rest; not with a preload [m]"""
     normal_stiffness: Positive | None = None
     """stiffness across the joint (default: by the contact law) [N/m]"""
+    tangential_stiffness: Positive | None = None
+    """stiffness along the joint until it slips, unloaded at time zero; needs normal_stiffness (default: rigid) [N/m]"""
+    residual: bool = False
+    """put the flexibility between the points that the reduced model's modes lack in series with both stiffnesses, or in
+    their places"""
     restitution: Fraction = 0.0
     """coefficient of restitution, where the contact law takes one [-]"""
     sectors: Sectors | None = None
@@ -75,11 +80,19 @@ class Joint(SceneElement):
             raise ValueError(f'normal: expected "{_CASING}" in the same place as in between')
         if self.gap and (self.preload or self.preload_by_speed):
             raise ValueError("gap: a joint that is open at rest has no preload; give one of them")
+        if self.tangential_stiffness is not None and not self.yields:
+            raise ValueError("tangential_stiffness: needs normal_stiffness, of the same part; give both")
 
     @property
     def yields(self) -> bool:  # type: ignore[override]
         """Whether it has a spring of its own across."""
-        return self.normal_stiffness is not None
+        return self.normal_stiffness is not None or self.residual
+
+    @property
+    def sliders(self) -> int:
+        """Number of its units that have a spring along."""
+        springs = self.tangential_stiffness is not None or self.residual
+        return int(springs and self.friction > 0.0)
 
     def labels(self) -> Mapping[str, str | None]:
         """Return the labels of its points, by key and place."""
@@ -113,21 +126,30 @@ class Joint(SceneElement):
     def units(self, number: int, parts: Parts) -> Iterator[Unit]:
         """Yield its contact."""
 
-        def apart(key: str) -> np.ndarray:
+        def shares(key: str) -> dict[str, float]:
             points: _Points = getattr(self, key)
-            motions = [
-                sign * parts.motion(label, f"joint[{number}].{key}")
-                for sign, label in zip((1.0, -1.0), points, strict=True)
-                if label != _CASING
-            ]
+            return {label: sign for label, sign in zip(points, (1.0, -1.0), strict=True) if label != _CASING}
+
+        def apart(key: str) -> np.ndarray:
+            motions = [sign * parts.motion(label, f"joint[{number}].{key}") for label, sign in shares(key).items()]
             return np.sum(motions, axis=0)
 
-        normal, load = apart("normal"), self.preload + self.preload_by_speed * parts.speed**2
-        if self.normal_stiffness is not None:
-            element = Element(0.0, self.normal_stiffness)
+        def stiffness(key: str, given: float | None) -> float:
+            yields = (1.0 / given if given else 0.0) + self.residual * parts.flexibility(shares(key))
+            if not yields > 0.0:
+                raise InputError(
+                    f"joint[{number}].residual: the modes lack none between {' and '.join(shares(key))}; "
+                    "give stiffnesses, or take fewer modes"
+                )
+            return 1.0 / yields
+
+        normal, slip, load = apart("normal"), apart("between"), self.preload + self.preload_by_speed * parts.speed**2
+        if self.yields:
+            element = Element(0.0, stiffness("normal", self.normal_stiffness))
         else:
-            element = parts.contact(normal, self.restitution, *(one for one in self.normal if one != _CASING))
+            element = parts.contact(normal, self.restitution, *shares("normal"))
+        tangential = stiffness("between", self.tangential_stiffness) if self.sliders else np.inf
         yield Unit(
-            normal, apart("between"), self.gap - load / element.stiffness, self.friction, element, 0.0, number,
-            closing=load,
+            normal, slip, self.gap - load / element.stiffness, self.friction, element, 0.0, number, closing=load,
+            tangential=tangential,
         )  # fmt: skip

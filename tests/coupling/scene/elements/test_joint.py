@@ -49,24 +49,24 @@ def scene(structure, joint, loads=((0, 60.0, 0.0),), frequency=20.0, **more):
 class Piecewise:
     """The motion with one joint on a spring, from state to state: matrix exponentials, and roots by bisection."""
 
-    def __init__(self, structure, joint, loads, frequency):
-        self.structure, omega = structure, 2 * np.pi * frequency
-        self.along, self.across = np.array([1.0, 0, -1, 0]), np.array([0, 1.0, 0, -1])
+    def __init__(self, structure, joint, loads, frequency, along=(1.0, 0, -1, 0), across=(0, 1.0, 0, -1)):
+        omega, n = 2 * np.pi * frequency, len(along)
+        self.along, self.across = np.array(along), np.array(across)
         self.spring, self.friction = joint["normal_stiffness"], joint["friction"]
         self.rest = joint.get("gap", 0.0) - joint.get("preload", 0.0) / self.spring
         self.inverse = np.linalg.inv(structure.mass)
-        self.free = np.zeros((4, 11))  # forces by (q, q', cos, sin, 1)
-        self.free[:, :4], self.free[:, 4:8] = -structure.stiffness, -structure.damping
-        self.free[:, 10] = -joint.get("preload", 0.0) * self.across
+        self.free = np.zeros((n, 2 * n + 3))  # forces by (q, q', cos, sin, 1)
+        self.free[:, :n], self.free[:, n : 2 * n] = -structure.stiffness, -structure.damping
+        self.free[:, -1] = -joint.get("preload", 0.0) * self.across
         for at, force, phase in loads:
-            self.free[at, 8] += force * np.sin(np.deg2rad(phase))
-            self.free[at, 9] += force * np.cos(np.deg2rad(phase))
-        self.turn = np.zeros((11, 11))
-        self.turn[:4, 4:8], self.turn[8, 9], self.turn[9, 8] = np.eye(4), -omega, omega
+            self.free[at, -3] += force * np.sin(np.deg2rad(phase))
+            self.free[at, -2] += force * np.cos(np.deg2rad(phase))
+        self.turn = np.zeros((2 * n + 3, 2 * n + 3))
+        self.turn[:n, n : 2 * n], self.turn[-3, -2], self.turn[-2, -3] = np.eye(n), -omega, omega
         self.period = 2 * np.pi / omega
         # functionals of the state
-        self.gap = np.r_[self.across, np.zeros(6), self.rest]
-        self.slip = np.r_[np.zeros(4), self.along, np.zeros(3)]
+        self.gap = np.r_[self.across, np.zeros(n + 2), self.rest]
+        self.slip = np.r_[np.zeros(n), self.along, np.zeros(3)]
         self.push = -self.spring * self.gap
         held = self.free + np.outer(self.across, self.push)
         self.drag = -(self.along @ self.inverse @ held) / (
@@ -81,7 +81,7 @@ class Piecewise:
             forces += np.outer(self.across, self.push)
             forces += np.outer(self.along, self.drag if state == STICK else -state * self.friction * self.push)
         turn = self.turn.copy()
-        turn[4:8] = self.inverse @ forces
+        turn[len(forces) : -3] = self.inverse @ forces
         return turn
 
     def guards(self, state):
@@ -107,8 +107,8 @@ class Piecewise:
         return STICK if event != "slip" and over <= 0.0 else -np.sign(self.drag @ z)
 
     def run(self, periods):
-        """Return states at the ends of periods (periods, 11), and events."""
-        z = np.r_[np.zeros(8), 1.0, 0.0, 1.0]
+        """Return states at the ends of periods (periods, 2 n + 3), and events."""
+        z = np.r_[np.zeros(len(self.turn) - 3), 1.0, 0.0, 1.0]
         state = STICK if self.rest < 0.0 else OPEN
         sections, events, t = [], [], 0.0
         for period in range(1, periods + 1):
