@@ -17,7 +17,7 @@ _ONE_FREQUENCY = "an orbit has one frequency"
 NOT_IN_ORBITS = {
     "confidence": "means over an orbit's own periods are exact",
     "transient": "the state of an orbit is its section",
-    "joint": "is of runs and sweeps: run the orbit, `vanedamp.orbit_at`",
+    "contact_friction": "is of runs and sweeps: run the orbit, `vanedamp.orbit_at`",
     "undamped_top": _ONE_FREQUENCY,
     "fixed_top": _ONE_FREQUENCY,
 }

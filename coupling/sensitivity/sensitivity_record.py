@@ -21,7 +21,7 @@ NOT_IN_DERIVATIVES: dict[str, str] = {
     "lyapunov": "is the growth of these derivatives in a motion that does not repeat",
     **dict.fromkeys(("section", "slip", "slip_velocity"), "is a series of states: `state_derivative` has the last"),
     "transient": "is a number of periods",
-    "joint": "is of runs and sweeps",
+    "contact_friction": "is of runs and sweeps",
 }
 
 

@@ -12,7 +12,7 @@ _ENDLESS, _FREE = "is of a lasting motion", "nothing excites the motion"
 _NOT_STEADY = {
     "confidence": "there is no constant mean about which periods scatter",
     "unbalanced": "is of the whole run: `energy_residual`",
-    "joint": "is of runs and sweeps",
+    "contact_friction": "is of runs and sweeps",
     "overlap": "only the exact engine runs them, in which nothing overlaps",
     **dict.fromkeys(("lyapunov", "section", "slip", "slip_velocity", "transient"), _ENDLESS),
 }

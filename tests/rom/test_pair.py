@@ -314,7 +314,7 @@ def write_sector(path, gap=1e-3):
             sides = {"low": 0.0, "high": sixth, "side_low": small, "side_high": sixth - small}
             names = [name for name, of in sides.items() if middle and abs(angle - of) < 1e-6]
             between = middle and abs(angle - sixth / 2) < 0.1
-            names += ["hub"] * (between and radius < 1.0) + ["tip"] * (between and radius > 1.7)
+            names += ["hub"] if between and radius < 1.0 else ["tip"] if between and radius > 1.7 else []
             for name in names:
                 groups[name] = tag
         for name, tag in groups.items():

@@ -200,7 +200,7 @@ def test_runs_after_a_refused_point_are_those_by_themselves(monkeypatch):
 def test_a_worker_keeps_the_last_kind(monkeypatch):
     scene, made = validate(Scene, _ONE, "scene"), []
     kind = alike.SceneBatch
-    monkeypatch.setattr(alike, "SceneBatch", lambda scene: made.append(1) or kind(scene))
+    monkeypatch.setattr(alike, "SceneBatch", lambda *given: made.append(1) or kind(*given))
     alike._KEPT.kinds.clear()
     first = run_points(scene, NOTHING, _POINTS["frequencies"][1], Task(range(12)))
     again = run_points(validate(Scene, _ONE, "scene"), NOTHING, _POINTS["frequencies"][1], Task(range(12)))
