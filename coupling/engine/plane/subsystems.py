@@ -119,19 +119,23 @@ def _same(stack: PlanarSubsystems, system: System, state: np.ndarray) -> np.ndar
 
 
 def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
-    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, and of springs (s, N)."""
-    root = np.sqrt(system.mass)
+    """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, and of springs (s, N).
+
+    A slider that a spring pulls is a direction of its own: it rests, whatever its driver does.
+    """
+    root, massive = np.sqrt(system.mass), len(system.mass) - len(system.tangential)
     matrix = system.stiffness / root / root[:, None]
     size = np.sqrt(np.abs(np.diag(matrix)).max(initial=0.0))
     rows = springs / root
     rows *= (size**2 or 1.0) / np.linalg.norm(rows, axis=1)[:, None]
     both = np.vstack([matrix, size * system.damping / root / root[:, None], rows])
-    touched = np.flatnonzero(both.any(axis=0))
-    if not len(touched):
-        return np.zeros((0, len(root)))
-    if len(touched) == 1 or np.linalg.matrix_rank(both[:, touched]) == len(touched):
-        return np.eye(len(root))[touched]
-    basis: np.ndarray = orth(both.T, rcond=RANK).T
+    unit, touched = np.eye(len(root)), np.flatnonzero(both.any(axis=0))
+    moving = touched[touched < massive]
+    if len(moving) <= 1 or np.linalg.matrix_rank(both[:, moving]) == len(moving):
+        return unit[touched]
+    basis: np.ndarray = np.vstack(
+        [orth((both @ unit[:massive].T).T, rcond=RANK).T @ unit[:massive], unit[touched[touched >= massive]]]
+    )
     return basis
 
 

@@ -46,7 +46,7 @@ def woodpecker():
         limit=three, restitution=np.array([BEAK, 0.0, 0.0]), restitution_at=0,
         spring=np.full(3, np.inf), dashpot=np.zeros(3), tangential=np.zeros(0), elongation=np.zeros((0, 3)),
         two_phases=False, moment=1e-6 * RECORDED,
-        play=np.full(3, 2 * (R_M - R_0)),
+        play=np.full(3, 2 * (R_M - R_0)), slider=np.full(3, -1),
         body=np.zeros(3, np.int64), surface=np.array([LEFT, LEFT, RIGHT]), corner=np.array([-1, 0, 1]),
         along=np.zeros(1, np.int64), tilt=np.full(1, 2), floor=one, turn=one, rise=one, height=np.zeros(1),
         cavity=np.zeros(1, np.int64), neglected=np.zeros(1),

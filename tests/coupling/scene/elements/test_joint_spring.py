@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from numba import njit
 
 import vanedamp as vd
 from tests.coupling.scene.elements.test_joint import JOINT, LOADS, OPEN, STICK, Matrices, Piecewise, matrices, scene
@@ -246,3 +247,64 @@ def test_rigid_joints_all_round_are_rejected(more):
         vd.simulate(made.replace({"joint": [joint | more for joint in joints]}))
     pressed = vd.simulate(made.replace({"joint": [joint | {"normal_stiffness": 1e6} for joint in joints]}))
     assert pressed.energy["friction"] > 0.0
+
+
+@njit
+def stepped(mass, stiffness, damping, rows, joint, load, periods, steps):
+    """Displacement of coordinate 1, 100 times per period, by own explicit steps; rows: across and along, by joint."""
+    preload, across, along, friction, omega = joint
+    h, kept = 2 * np.pi / omega / steps, []
+    q, v, slider = np.zeros(len(mass)), np.zeros(len(mass)), np.zeros(len(rows))
+    for step in range(periods * steps):
+        if step % (steps // 100) == 0:
+            kept.append(q[1])
+        force = load * np.sin(omega * h * step) - stiffness @ q - damping @ v
+        for j in range(len(rows)):
+            push, driver = max(preload - across * (rows[j, 0] @ q), 0.0), rows[j, 1] @ q
+            bound = friction * push / along
+            slider[j] = min(max(slider[j], driver - bound), driver + bound)
+            force += rows[j, 0] * (push - preload) - rows[j, 1] * (along * (driver - slider[j]))
+        v += (0.5 if step == 0 else 1.0) * h * force / mass
+        q += h * v
+    return np.array(kept)
+
+
+@pytest.mark.parametrize(("load", "frequency"), [(20.0, 128.0), (5.0, 127.0)])
+def test_a_wedge_between_platforms_is_a_part_with_two_joints(load, frequency):
+    """Its centrifugal load presses it on both faces; under the smaller one it flies."""
+    sine, cosine, unit = np.sin(np.deg2rad(40.0)), np.cos(np.deg2rad(40.0)), np.eye(8)
+    blade = 1e5 * np.array([[3.0, -1.0, 0.3], [-1.0, 1.0, 0.0], [0.3, 0.0, 20.0]])  # platform, tip, platform's height
+    mass, stiffness = np.r_[np.full(6, 0.1), 0.02, 0.02], np.zeros((8, 8))
+    stiffness[:3, :3] = stiffness[3:6, 3:6] = blade
+    damping = 2e-5 * stiffness
+    labels, rows = {"tip": 1, "tip_b": 4}, np.zeros((2, 2, 8))
+    for j, (platform, side) in enumerate(((0, 1.0), (3, -1.0))):
+        for across, (x, y) in enumerate(((side * cosine, sine), (side * sine, -cosine))):
+            end = "_across" * across
+            labels[f"platform_{j}{end}"] = x * unit[platform] + y * unit[platform + 2]
+            labels[f"wedge_{j}{end}"] = x * unit[6] + y * unit[7]
+            rows[j, 1 - across] = labels[f"wedge_{j}{end}"] - labels[f"platform_{j}{end}"]
+    preload, periods = load / (2 * cosine), 4
+    springs = {"normal_stiffness": 4e6, "tangential_stiffness": 3e6}
+    made = vd.Scene(
+        structure=ReducedModel.from_matrices(np.diag(mass), stiffness, labels, damping=damping),
+        excitation={
+            "frequency": frequency, "at": "tip",
+            "load": [{"at": "tip", "force": 6.0}, {"at": "tip_b", "force": 6.0, "phase": 180.0}],
+        },
+        joint=[
+            springs | {"friction": 0.3, "preload": preload} | {
+                key: [f"wedge_{j}{end}", f"platform_{j}{end}"] for key, end in (("between", ""), ("normal", "_across"))
+            }
+            for j in range(2)
+        ],
+        time={"periods": periods, "transient": 0},
+    )  # fmt: skip
+    response = vd.simulate(made, samples_per_period=100)
+    assert response.status is vd.Status.OK
+    assert abs(response.energy_residual) < 1e-10
+    joint = (preload, *springs.values(), 0.3, 2 * np.pi * frequency)
+    force = 6.0 * (unit[1] - unit[4])
+    own = [stepped(mass, stiffness, damping, rows, joint, force, periods, steps) for steps in (10000, 40000)]
+    errors = [np.abs(one - response.displacement[: 100 * periods]).max() / np.abs(one).max() for one in own]
+    assert errors[1] < 0.5 * errors[0] < 1e-4
