@@ -52,8 +52,6 @@ _CAUTION = 5.0
 #: resonances in the range that are tried, fraction of the highest from which on they count, and steps from
 #: loose (0) to fixed bodies (1)
 _RESONANCES, _SEEN, _PLACES = 4, 0.03, (0.0, 0.5, 1.0)
-#: distance from resonances of stuck joints at which errors are looked at, relative: undamped ones are not seen on top
-_BESIDE = 1e-3
 #: scenes of a sweep that are tried, of those that differ in more than their frequency
 _SCENES = 4
 #: speeds of rotation that are tried, of those that the scenes have
@@ -321,10 +319,9 @@ def _ladders(
 
 
 def _joined(scenes: Sequence[Scene]) -> list[Scene]:
-    """Return scenes that differ in joints and friction dampers, at most as many as are tried, with all modes."""
+    """Return scenes that differ in joints and friction dampers, with all modes."""
     apart = {(one.friction_damper, tuple(one.elements)): with_modes(one, None) for one in scenes if _rubbing(one)}
-    tried = np.unique(np.linspace(0, len(apart) - 1, _SCENES).astype(int)) if apart else ()
-    return [list(apart.values())[index] for index in tried]
+    return list(apart.values())
 
 
 def _rubbing(scene: Scene) -> list[str]:
@@ -338,7 +335,7 @@ def _with_stuck(scenes: Sequence[Scene], frequencies: np.ndarray) -> np.ndarray:
     """Return frequencies (f,), Hz, with those around the resonances of stuck joints between them."""
     squares = [linear_response(assemble(scene), True).natural[0] for scene in _joined(scenes)]
     natural = np.sqrt(np.concatenate([np.zeros(0), *squares])) / (2 * math.pi)
-    near = np.multiply.outer(natural, 1.0 + np.array([-_BESIDE, _BESIDE])).ravel()
+    near = np.multiply.outer(natural, [0.999, 1.001]).ravel()  # undamped ones have no height
     return np.union1d(frequencies, near[(near > frequencies[0]) & (near < frequencies[-1])])
 
 

@@ -274,11 +274,7 @@ def _held(free: LinearResponse, rows: np.ndarray, spring: np.ndarray, dashpot: n
     soft, rigid, mass = rows[yields], rows[~yields], free.mass
     stiffness = np.diag(free.stiffness) + (spring[yields] * soft.T) @ soft
     # neighbours around a ring may hold each other twice
-    left = (
-        null_space(rigid / np.linalg.norm(rigid, axis=1)[:, None], rcond=SINGULAR)
-        if len(rigid)
-        else np.eye(len(soft.T))
-    )
+    left = null_space(np.vstack([rigid, 0.0 * free.response]), rcond=SINGULAR)
     if not left.size:
         return replace(free, stiffness=np.zeros(0), damping=left.T @ left, mass=left.T @ left, shape=left)
     squares, shapes = eigh(left.T @ stiffness @ left, left.T @ mass @ left)
@@ -305,14 +301,14 @@ def _stuck(system: System) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return rows[moves], spring[moves], dashpot[moves]
 
 
-def fixed_mode(system: System, mode: int) -> tuple[float, np.ndarray]:
-    """Return angular frequency, rad/s, and shape (n,) of the fixed mode most like a free one; nan, zeros: none."""
+def fixed_mode(system: System, motion: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return angular frequency, rad/s, and shape (n,) of the fixed mode most like a motion (n,); nan, zeros: none."""
     fixed = linear_response(system, True)
     squares, shapes = fixed.natural
     if not len(squares):
         return math.nan, np.zeros(system.modes)
     shapes = shapes if fixed.shape is None else fixed.shape
-    like = int(np.argmax(np.abs(shapes[mode])))
+    like = int(np.argmax(np.abs(motion @ shapes)))
     return float(np.sqrt(squares[like])), shapes[:, like]
 
 

@@ -131,7 +131,7 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
 
 def _linear(system: System, mode: int) -> LinearMode:
     """Return the results of a mode without bodies, and with all fixed: of the mode that is most like it."""
-    modes, (fixed, shape) = system.of_structure, fixed_mode(system, mode)
+    modes, (fixed, shape) = system.of_structure, fixed_mode(system, np.eye(system.modes)[mode])
     omega = np.sqrt(modes.stiffness[mode])
     return LinearMode(
         mode, float(omega / (2 * np.pi)), float(modes.damping[mode, mode] / (2 * omega)),

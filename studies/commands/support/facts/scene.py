@@ -17,12 +17,13 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom
 from vanedamp.coupling.sweep.grid import Points, base_scene, grid
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.linear_response import fixed_mode, linear_amplitudes, linear_responses
+from vanedamp.coupling.system.linear_response import fixed_mode, linear_amplitudes, linear_response, linear_responses
 from vanedamp.coupling.system.modal_basis import basis_of
 from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.coupling.system.transient import left_over, timed
+from vanedamp.files.store import finite
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, part_doubts, sweep_doubts
 from vanedamp.studies.facts import Fact
@@ -128,8 +129,10 @@ def _of_level(scene: Scene, resonance: Resonance | None) -> Iterator[Fact]:
         yield Fact("resonance_amplitude", _top(scene, resonance), "m", "X, there")
         yield Fact("modal_mass", resonance.mass, "kg", "of that mode at the response")
         if names:
-            hertz = fixed_mode(assemble(scene), resonance.mode)[0] / (2 * np.pi)
-            yield Fact("fixed_hz", hertz, "Hz", f"of the mode most like it, {held}")
+            system = assemble(scene)
+            motion = linear_response(system, False).motion(resonance.frequency)[0]
+            hertz = fixed_mode(system, motion)[0] / (2 * np.pi)
+            yield Fact("fixed_hz", finite(hertz), "Hz", f"of the mode most like it, {held}")
     yield Fact("amplitude_undamped", float(undamped[0]), "m", f"at the excitation's frequency, {free}")
     yield Fact("amplitude_fixed", float(fixed[0]), "m", f"there, {held}")
 
