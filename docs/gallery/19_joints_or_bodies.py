@@ -95,8 +95,8 @@ axes.legend()
 plt.show()
 
 # %%
-# **Result.** The best of the four preloads leaves 20 µm of 1.5 mm at these points in the tuned ring, and as little in the
-# mistuned one. A damper whose centrifugal force is that preload has 26 mg. Bodies of 4 g leave more than a third in the
-# tuned and a quarter in the mistuned ring: per gram, the joints are far better here. Half the preload leaves eight times
-# as much, twice the preload not twice as much. These bodies are without centrifugal load: in a straight cavity at the
-# radius r of the tip, friction holds a body until the blade moves by friction r / order², 12 mm here.
+# **Result.** The best of the four preloads leaves 20 µm of 1.5 mm at these points in the tuned ring, and as little in
+# the mistuned one. A damper whose centrifugal force is that preload has 26 mg. Bodies of 4 g leave more than a third
+# in the tuned and a quarter in the mistuned ring: per gram, the joints are far better here. Half the preload leaves
+# eight times as much, twice the preload not twice as much. These bodies are without centrifugal load: in a straight
+# cavity at the radius r of the tip, friction holds a body until the blade moves by friction r / order², 12 mm here.
