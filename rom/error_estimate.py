@@ -34,6 +34,9 @@ _WITHOUT_RESIDUAL: dict[str, Any] = {
     "residual_flexibility": None, "residual_recovery": None, "output_residual": None,
 }  # fmt: skip
 
+#: receptances (f, k, k), m/N, at the interface of a model by frequencies, Hz: of the model, or of one that is held
+Receptance = Callable[[ReducedModel, "Sequence[float] | np.ndarray"], np.ndarray]
+
 
 class LadderError(VanedampError):
     """No model meets the tolerance, or the tolerance is out of range; the message names the remedy."""
@@ -90,6 +93,7 @@ def frf_errors(
     frequencies_hz: Sequence[float] | np.ndarray,
     labels: Sequence[str] | None = None,
     forces: Sequence[str] | None = None,
+    receptance: Receptance = ReducedModel.receptance,
 ) -> np.ndarray:
     """Return the estimated relative error (f,) of a model's receptance matrix (Frobenius norm).
 
@@ -97,7 +101,7 @@ def frf_errors(
     that count (default: all); forces: those at which forces act (default: the same). Rotations count as the
     displacements that they are at the radius of gyration of their patch.
     """
-    return _errors(model.receptance(frequencies_hz), richer, frequencies_hz, labels, forces)
+    return _errors(receptance(model, frequencies_hz), richer, frequencies_hz, labels, forces, receptance)
 
 
 def worst_rungs(ladders: Sequence[Sequence[Rung]]) -> list[Rung]:
@@ -131,13 +135,13 @@ def rigid_errors(
 
 def _errors(
     receptance: np.ndarray, richer: ReducedModel, frequencies_hz: Sequence[float] | np.ndarray,
-    labels: Sequence[str] | None, forces: Sequence[str] | None,
+    labels: Sequence[str] | None, forces: Sequence[str] | None, of: Receptance = ReducedModel.receptance,
 ) -> np.ndarray:  # fmt: skip
     """Return the relative errors (f,) of receptances (f, k, k) against a richer model's."""
     rows = [richer.interface.index(label) for label in labels or richer.interface]
     columns = [richer.interface.index(label) for label in forces or labels or richer.interface]
     lengths = np.outer(richer.lengths[rows], richer.lengths[columns])
-    better = richer.receptance(frequencies_hz)[:, rows][:, :, columns]
+    better = of(richer, frequencies_hz)[:, rows][:, :, columns]
     errors = lengths * (receptance[:, rows][:, :, columns] - better)
     return np.linalg.norm(errors, axis=(1, 2)) / np.linalg.norm(lengths * better, axis=(1, 2))
 
@@ -149,18 +153,22 @@ def natural_ladder(
     forces: Sequence[str] | None = None,
     collisions: Callable[[ReducedModel], Sequence[WallContact]] = lambda model: (),
     attached: bool = False,
+    others: Sequence[Receptance] = (),
 ) -> list[Rung]:
     """Return the errors of models of 1, 2, 3, ... natural modes of a model against the whole, which is the last.
 
     collisions: the contacts, which may depend on the model, always in the same order; where a model
-    has none but others do, contact has no meaning on it, and it is left out. attached: with attachment modes.
+    has none but others do, contact has no meaning on it, and it is left out. attached: with attachment modes. others:
+    receptances whose errors count as well.
     """
     squares, shapes = spectrum(richer.mass, richer.stiffness)
     rungs, pulses = [], []
     for model in _natural_models(richer, attached):
         modes = model.free_modes
         plain = model if attached else replace(model, **_WITHOUT_RESIDUAL)
-        receptance = float(frf_errors(plain, richer, frequencies_hz, labels, forces).max())
+        compared = (ReducedModel.receptance, *others)
+        errors = [frf_errors(plain, richer, frequencies_hz, labels, forces, of) for of in compared]
+        receptance = float(np.max(errors))
         met = collisions(model)
         pulses.append(_pulses(model, met, float(frequencies_hz.max())))
         above = [share_above(squares, richer.row(item.label) @ shapes, modes, item) for item in met]

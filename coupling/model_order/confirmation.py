@@ -131,9 +131,9 @@ class _Pair:
         flying = [
             replace(body, velocity=body.velocity + speed) for body, speed in zip(scene.damper, speeds, strict=True)
         ]
-        self._starts = (scene, replace(scene, damper=tuple(flying)))
+        self._starts = (scene, *([replace(scene, damper=tuple(flying))] if flying else []))
         self._whole, widths = self._means(whole)
-        apart = float(abs(self._whole[1] - self._whole[0]))
+        apart = float(abs(self._whole[-1] - self._whole[0]))
         self.apart = 0.0 if apart <= tolerance + np.linalg.norm(widths) else apart
 
     def difference(self, rung: Rung) -> float:

@@ -1,9 +1,10 @@
 """Model order selection: how many modes of a reduced model a scene needs, and how long its transient is.
 
 `modes = "auto"` takes the fewest natural modes whose estimated error stays within the tolerance (rom.error_estimate):
-of the receptance from the excitation to the response and the cavity's surfaces at the excitation frequencies, plus
-the error of a collision's pulse, in proportion to the bodies' possible effect on the response. The whole model of
-the file is the measure; of scenes at several speeds of rotation at the lowest, the middle and the highest of these.
+of the receptance from the excitation to the response, the cavity's surfaces and joints at the excitation frequencies,
+with joints open and stuck, plus the error of a collision's pulse, in proportion to the bodies' possible effect on the
+response. The whole model of the file is the measure; of scenes at several speeds of rotation at the lowest, the middle
+and the highest of these.
 
 A boundary without mass yields under its contact force by the flexibility G that the modes lack, u = Phi eta + G f,
 while it touches and not otherwise. For one contact at a time this is a spring 1/G between body and modes, which is what
@@ -17,6 +18,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +29,10 @@ from vanedamp.coupling.response.moved_start import touching
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.scene.structures import Rom
+from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.body_loads import load_warnings
+from vanedamp.coupling.system.linear_response import linear_response
+from vanedamp.coupling.system.modal_basis import modal_basis
 from vanedamp.coupling.system.reduced_model_file import greatest_speed, reduced_model
 from vanedamp.coupling.system.resonance import excitation_force
 from vanedamp.files.toml_input import InputError
@@ -88,8 +93,8 @@ def choices_of(scenes: Iterable[Scene], more: bool = False) -> Choices:
     groups: dict[tuple[Any, ...], list[Scene]] = {}
     for scene in filter(needs_selection, scenes):
         fault = ""
-        if any(element.on_structure for _, _, element in scene.elements):
-            fault = "weighs collisions of bodies, not those of stops"
+        if any(one.on_structure and not (one.rubs and one.yields) for _, _, one in scene.elements):
+            fault = "weighs collisions of bodies, not those of stops and of joints without normal_stiffness"
         elif scene.excitation.signal is not None:
             fault = "weighs errors at the frequencies of sines, and a waveform has no highest one"
         elif not _has_first_order(scene):
@@ -244,8 +249,8 @@ def _touched(scene: Scene, model: ReducedModel) -> list[tuple[int, int]]:
 def _choice(scenes: Sequence[Scene], periods: float) -> Choice:
     """Return the fewest natural modes for all of these scenes, which have one model. periods: to be run with it."""
     first = scenes[0]
-    rigid_contacts = any(scene.contact.rigid for scene in scenes)
-    trying = not rigid_contacts and bool(first.damper)
+    rigid_contacts = any(scene.contact.rigid for scene in scenes if scene.damper)
+    trying = not rigid_contacts and bool(first.damper or _rubbing(first))
     brief = trying and periods <= WORTH
     structure, at = first.structure, first.excitation.at
     assert isinstance(structure, Rom) and at is not None
@@ -260,7 +265,8 @@ def _choice(scenes: Sequence[Scene], periods: float) -> Choice:
             if label not in model.interface:
                 raise InputError(f"structure: no interface label '{label}'; it has {', '.join(model.interface)}")
         at_speed = [scene for scene in scenes if scene.speed == speeds[index]]
-        compared.append(_ladders(at_speed, model, frequency_grid(model, min(driven), max(driven)), at, labels, brief))
+        frequencies = _with_stuck(at_speed, frequency_grid(model, min(driven), max(driven)))
+        compared.append(_ladders(at_speed, model, frequencies, at, labels, brief))
     rigid = max(ladders.rigid for ladders in compared)
     choices = [
         choose(worst_rungs([ladders.rungs[attached] for ladders in compared]), structure.tolerance, rigid)
@@ -299,16 +305,45 @@ def _ladders(
             return []  # it has no boundary without mass
         return list(dict.fromkeys(item for scene in scenes for item in _collisions(scene, smaller)))
 
+    stuck = [partial(_stuck_receptance, scene) for scene in _joined(scenes)]
     share = min(1.0, _IMPACTS * max(_influence(scene, model, frequencies) for scene in scenes))
     share = _SAFETY * min(share, _CAUTION * _sensitivity(scenes, model, frequencies))
     loose, attached = (
         [
             replace(rung, collision=share * rung.collision)
-            for rung in natural_ladder(model, frequencies, labels, forced, collisions, attached)
+            for rung in natural_ladder(model, frequencies, labels, forced, collisions, attached, stuck)
         ]
         for attached in (False, True)
     )
     return _Ladders(rigid, (loose, attached))
+
+
+def _joined(scenes: Sequence[Scene]) -> list[Scene]:
+    """Return scenes that differ in joints and friction dampers, with all modes."""
+    apart = {(one.friction_damper, tuple(one.elements)): with_modes(one, None) for one in scenes if _rubbing(one)}
+    return list(apart.values())
+
+
+def _rubbing(scene: Scene) -> list[str]:
+    """Return the labels of joints and friction dampers."""
+    given = [one for damper in scene.friction_damper for one in (damper.at or scene.excitation.at, damper.to)]
+    given += [label for _, _, one in scene.elements for label in one.labels().values()]
+    return [label for label in given if label is not None]
+
+
+def _with_stuck(scenes: Sequence[Scene], frequencies: np.ndarray) -> np.ndarray:
+    """Return frequencies (f,), Hz, with those around the resonances of stuck joints between them."""
+    squares = [linear_response(assemble(scene), True).natural[0] for scene in _joined(scenes)]
+    natural = np.sqrt(np.concatenate([np.zeros(0), *squares])) / (2 * math.pi)
+    near = np.multiply.outer(natural, [0.999, 1.001]).ravel()  # undamped ones have no height
+    return np.union1d(frequencies, near[(near > frequencies[0]) & (near < frequencies[-1])])
+
+
+def _stuck_receptance(scene: Scene, model: ReducedModel, frequencies: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return the receptance (f, k, k) of a model whose bodies are fixed and whose joints stick."""
+    basis, omega = modal_basis(model), 2 * math.pi * np.asarray(frequencies)
+    held, rows = linear_response(assemble(scene, basis), True), np.array(list(basis.rows.values()))
+    return np.stack([held.steady(row, omega) @ rows.T for row in rows], axis=2)
 
 
 def _influence(scene: Scene, model: ReducedModel, frequencies: np.ndarray) -> float:
@@ -424,4 +459,5 @@ def _yields(model: ReducedModel) -> bool:
 
 
 def _surfaces(scene: Scene) -> list[str]:
-    return [label for cavity in scene.cavity for label in cavity.labels() if label is not None]
+    """Return the labels of cavities and joints."""
+    return [label for cavity in scene.cavity for label in cavity.labels() if label is not None] + _rubbing(scene)

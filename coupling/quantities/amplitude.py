@@ -73,11 +73,11 @@ def phase(harmonic: Any, counted: Any, period: Any) -> Any:
 
 @quantity("m", spread=True)
 def amplitude_undamped(undamped: Any) -> Any:
-    """amplitude of the linear structure without bodies, from the static deflection; unknown under noise"""
+    """amplitude of the linear structure without bodies and joints, from the static deflection; unknown under noise"""
     return undamped
 
 
 @quantity("m", spread=True)
 def amplitude_fixed(fixed: Any) -> Any:
-    """the same with every body fixed in its cavity"""
+    """the same with every body fixed in its cavity, and joints and friction dampers stuck"""
     return fixed

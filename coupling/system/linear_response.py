@@ -1,4 +1,7 @@
-"""The linear references of a damped response: without bodies, and with bodies fixed."""
+"""The linear references of a damped response: free, without bodies and joints, and with bodies fixed and joints stuck.
+
+What sticks is rigid along, or its tangential spring. Joints closed at rest are springs across, or rigid; others open.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, null_space
 
 from vanedamp.coupling.scene.rotation import Rotation, frequency_of, speed_of
 from vanedamp.coupling.scene.scene import Scene
@@ -18,7 +21,8 @@ from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.engine_order import Natural, crossings
 from vanedamp.coupling.system.flow import attached, mass_of
 from vanedamp.coupling.system.resonance import steady_motion
-from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.system import CASING, System, on_structure
+from vanedamp.coupling.system.unit_laws import SINGULAR, contacts_of
 from vanedamp.files.toml_input import InputError
 
 #: frequencies over a range, and around each resonance in half-power widths: between two of them no maximum hides
@@ -44,8 +48,9 @@ class LinearPeak(NamedTuple):
 class LinearResponse:
     """A linear structure with n modes under its excitation, of e harmonics.
 
-    stiffness (n,), damping (n, n), mass (n, n), load (e, n) complex and response (n,) in modal coordinates; table (e,):
-    complex displacements of a prescribed motion, m; order (e,) of the harmonics, as multiples of the frequency.
+    load (e, n) complex and response (n,) in modal coordinates; stiffness (k,), damping (k, k) and mass (k, k) in those
+    left; shape: (n, k) modal coordinates by these (None: the same); table (e,): complex displacements of a prescribed
+    motion, m; order (e,) of the harmonics, as multiples of the frequency.
     """
 
     stiffness: np.ndarray
@@ -55,6 +60,7 @@ class LinearResponse:
     response: np.ndarray
     table: np.ndarray
     order: np.ndarray
+    shape: np.ndarray | None = None
 
     def amplitude(self, frequencies: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
         """Return amplitudes of the response (f,), m, at frequencies (f,), Hz; of harmonics the peak per period.
@@ -88,8 +94,7 @@ class LinearResponse:
 
         Raises LinAlgError at a resonance without damping.
         """
-        omega = 2 * np.pi * frequency * self.order
-        return steady_motion(self.stiffness, self.damping, self.mass, self.load, omega)
+        return self.steady(self.load, 2 * np.pi * frequency * self.order)
 
     def motions(self, frequencies: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:
         """Return the same (f, e, n) at frequencies (f,), infinite there; arguments as of `amplitude`."""
@@ -101,12 +106,20 @@ class LinearResponse:
         """Return those of harmonic h (f, n); load: (f, n)."""
         omega = 2 * np.pi * self.order[h] * frequencies
         try:
-            return steady_motion(self.stiffness, self.damping, self.mass, load, omega)
+            return self.steady(load, omega)
         except np.linalg.LinAlgError:
             if len(frequencies) == 1:
                 return np.full(load.shape, complex(np.inf))
             halves = (np.array_split(part, 2) for part in (frequencies, load))
             return np.concatenate([self._motion(h, *half) for half in zip(*halves, strict=True)])
+
+    def steady(self, load: np.ndarray, omega: np.ndarray) -> np.ndarray:
+        """Return modal coordinates (f, n) under modal forces (n,) or (f, n) at angular frequencies (f,)."""
+        if self.shape is None:
+            return steady_motion(self.stiffness, self.damping, self.mass, load, omega)
+        # products of matrices have other digits for one frequency than for many
+        loads = np.einsum("...n,nk->...k", load, self.shape)
+        return np.einsum("fk,nk->fn", steady_motion(self.stiffness, self.damping, self.mass, loads, omega), self.shape)
 
     def peak(self, low: float, high: float) -> LinearPeak:
         """Return the largest amplitude from low to high, Hz, to round-off; at an end where no resonance is higher."""
@@ -142,9 +155,14 @@ class LinearResponse:
             peak = max(peak, (-float(refined.fun), float(refined.x)))
         return peak
 
+    @property
+    def natural(self) -> tuple[np.ndarray, np.ndarray]:
+        """Squared undamped angular frequencies (k,), and mass-normalised shapes (k, k)."""
+        return eigh(np.diag(self.stiffness), self.mass) if len(self.mass) else (np.zeros(0), self.mass)
+
     def resonances(self) -> tuple[np.ndarray, np.ndarray]:
         """Return frequencies at which a harmonic meets a natural one, and half-power widths there (e n,), Hz."""
-        squares, shapes = eigh(np.diag(self.stiffness), self.mass) if len(self.mass) else (np.zeros(0), self.mass)
+        squares, shapes = self.natural
         widths = np.einsum("ik,ij,jk->k", shapes, self.damping, shapes) / (2 * np.pi)
         natural = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
         return np.divide.outer(natural, self.order).ravel(), np.divide.outer(widths, self.order).ravel()
@@ -227,7 +245,7 @@ def _resonances(
 
 
 def linear_responses(scene: Scene, system: System | None = None) -> tuple[LinearResponse, LinearResponse]:
-    """Return the responses without bodies, and with bodies fixed. system: of the scene.
+    """Return the free response, and that with bodies fixed and joints stuck. system: of the scene.
 
     Raises InputError, also for an excitation that is no sum of sines: the peak that a truncated Fourier series leaves
     out has no bound that holds for every waveform.
@@ -235,30 +253,70 @@ def linear_responses(scene: Scene, system: System | None = None) -> tuple[Linear
     if scene.excitation.signal is not None:
         raise InputError("excitation.waveform: linear curves are those of sums of sines; give harmonics")
     system = assemble(scene) if system is None else system
-    modes, order = system.of_structure, system.order
+    return linear_response(system, False), linear_response(system, True)
+
+
+def linear_response(system: System, fixed: bool) -> LinearResponse:
+    """Return the response without bodies and joints, or with bodies fixed and joints stuck, to the harmonics."""
+    motions, modes, order = attached(system, np.full(system.bodies, fixed)), system.of_structure, system.order
     moves = np.flatnonzero(system.load.any(axis=1) | (system.table != 0) | (order == order[-1]))
-    free, fixed = (
-        LinearResponse(
-            modes.stiffness, modes.damping, mass_of(system, motions), (system.load @ motions)[moves],
-            modes.response, system.table[moves], order[moves],
-        )
-        for motions in (attached(system, np.full(system.bodies, held)) for held in (False, True))
+    response = LinearResponse(
+        modes.stiffness, modes.damping, mass_of(system, motions), (system.load @ motions)[moves], modes.response,
+        system.table[moves], order[moves],
     )  # fmt: skip
-    return free, fixed
+    rows, spring, dashpot = _stuck(system)
+    return _held(response, rows, spring, dashpot) if fixed and len(rows) else response
 
 
-def fixed_mass(system: System) -> np.ndarray:
-    """Return the modal mass matrix (n, n) of the structure with bodies fixed."""
-    return mass_of(system, attached(system, np.ones(system.bodies, bool)))
+def _held(free: LinearResponse, rows: np.ndarray, spring: np.ndarray, dashpot: np.ndarray) -> LinearResponse:
+    """Return a response with motions (r, n) held by springs and dashpots (r,), or rigidly."""
+    yields = np.isfinite(spring)
+    soft, rigid, mass = rows[yields], rows[~yields], free.mass
+    stiffness = np.diag(free.stiffness) + (spring[yields] * soft.T) @ soft
+    # neighbours around a ring may hold each other twice
+    left = null_space(np.vstack([rigid, 0.0 * free.response]), rcond=SINGULAR)
+    if not left.size:
+        return replace(free, stiffness=np.zeros(0), damping=left.T @ left, mass=left.T @ left, shape=left)
+    squares, shapes = eigh(left.T @ stiffness @ left, left.T @ mass @ left)
+    shape = left @ shapes
+    damping = shape.T @ (free.damping + (dashpot[yields] * soft.T) @ soft) @ shape
+    return replace(free, stiffness=squares, damping=damping, mass=np.eye(len(squares)), shape=shape)
+
+
+def _stuck(system: System) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what joints and friction dampers hold that stick: motions (r, n), springs and dashpots (r,), inf: rigid.
+
+    Whatever their friction; joints with a gap at rest are open.
+    """
+    u, n = len(system.rest), system.modes
+    contact, J = contacts_of(system), on_structure(system).J[:, :n]
+    # friction dampers have units only with friction
+    sticks = system.without_body & J[u:].any(axis=1) & (~contact | (system.rest <= 0.0)) & (system.surface != CASING)
+    across, along = sticks & contact, np.full(u, np.inf)
+    along[system.sprung] = system.tangential
+    rows = np.concatenate([J[:u][across], J[u:][sticks], system.casing[:, :n]])
+    spring = np.concatenate([system.spring[across], along[sticks], system.casing_spring])
+    dashpot = np.zeros(len(rows))
+    dashpot[: across.sum()] = system.dashpot[across]
+    moves = rows.any(axis=1)
+    return rows[moves], spring[moves], dashpot[moves]
+
+
+def fixed_mode(system: System, motion: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return angular frequency, rad/s, and shape (n,) of the fixed mode most like a motion (n,); nan, zeros: none."""
+    fixed = linear_response(system, True)
+    squares, shapes = fixed.natural
+    if not len(squares):
+        return math.nan, np.zeros(system.modes)
+    shapes = shapes if fixed.shape is None else fixed.shape
+    like = int(np.argmax(np.abs(motion @ shapes)))
+    return float(np.sqrt(squares[like])), shapes[:, like]
 
 
 def receptance(scene: Scene, frequencies: np.ndarray, fixed: bool = False) -> np.ndarray:
     """Return the complex displacement of the response per newton at `excitation.at`, m/N, shape (f,).
 
-    Without bodies, or (`fixed`) with bodies fixed.
+    Free, or (`fixed`) with bodies fixed and joints stuck.
     """
-    system = assemble(scene)
-    modes, mass = system.of_structure, fixed_mass(system) if fixed else np.eye(system.modes)
-    omega = 2 * np.pi * np.asarray(frequencies)
-    motion = steady_motion(modes.stiffness, modes.damping, mass, modes.response, omega)
-    return np.asarray(motion @ modes.response)
+    held = linear_response(assemble(scene), fixed)
+    return np.asarray(held.steady(held.response, 2 * np.pi * np.asarray(frequencies)) @ held.response)

@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 
 from vanedamp.coupling.engine.backends import engine_run
 from vanedamp.coupling.methods.registry import respond
@@ -28,7 +27,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.simulation import parts_of
 from vanedamp.coupling.strength.spots import OF_HARMONIC, samples_of, spots_of
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.linear_response import fixed_mass
+from vanedamp.coupling.system.linear_response import fixed_mode
 from vanedamp.coupling.system.modal_basis import forced_label
 from vanedamp.coupling.system.reduced_model_file import hot_spots_in_file
 from vanedamp.coupling.system.system import System
@@ -132,13 +131,11 @@ def _followed(scene: Scene, system: System, table: RingDownTable, start: Restart
 
 def _linear(system: System, mode: int) -> LinearMode:
     """Return the results of a mode without bodies, and with all fixed: of the mode that is most like it."""
-    modes = system.of_structure
-    squares, shapes = eigh(np.diag(modes.stiffness), fixed_mass(system))
-    like = int(np.argmax(np.abs(shapes[mode])))
-    omega, fixed, shape = np.sqrt(modes.stiffness[mode]), np.sqrt(squares[like]), shapes[:, like]
+    modes, (fixed, shape) = system.of_structure, fixed_mode(system, np.eye(system.modes)[mode])
+    omega = np.sqrt(modes.stiffness[mode])
     return LinearMode(
         mode, float(omega / (2 * np.pi)), float(modes.damping[mode, mode] / (2 * omega)),
-        float(fixed / (2 * np.pi)), float(shape @ modes.damping @ shape / (2 * fixed)),
+        fixed / (2 * np.pi), float(shape @ modes.damping @ shape / (2 * fixed)),
     )  # fmt: skip
 
 

@@ -31,8 +31,8 @@ def response_figure(
     """
     reference = response.reference
     lines = [
-        trace("undamped", linear.x, linear.undamped / reference, _FREE, hoverinfo="skip"),
-        trace("fixed", linear.x, linear.fixed / reference, _FIXED, hoverinfo="skip"),
+        trace(curve, linear.x, getattr(linear, curve) / reference, colour, hoverinfo="skip", name=name)
+        for curve, name, colour in zip(("undamped", "fixed"), response.names, (_FREE, _FIXED), strict=False)
     ]
     points = [
         trace(
@@ -86,8 +86,8 @@ def key_figures(response: ForcedResponse, onset: tuple[float, float] | None) -> 
     headline = response.headline
     hits = "none in the band" if headline.onset is None else f"{headline.onset:.6g} Hz"
     return [
-        Figure("maximum without bodies X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at), True),
-        Figure("bodies fixed, maximum", _at(_micro(headline.fixed_peak), headline.fixed_peak_at), True),
+        Figure(f"{response.names.maximum} X", _at(_micro(headline.undamped_peak), headline.undamped_peak_at), True),
+        Figure(f"{response.names.fixed}, maximum", _at(_micro(headline.fixed_peak), headline.fixed_peak_at), True),
         *(() if onset is None else (Figure("onset of impacts, slow growth", _at_amplitude(*onset), True),)),
         Figure("damped peak (mean)", _at(_micro(headline.damped_peak), headline.damped_peak_at)),
         Figure("damped peak / X", _ratio(headline.peak_ratio)),

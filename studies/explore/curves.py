@@ -138,11 +138,12 @@ def _ends(scene: Scene, band: Band) -> tuple[float, float]:
     order = np.argsort(natural)
     mode = int(np.argmin(np.abs(natural[order] - scene.frequency)))
     top, width = float(natural[order][mode]), float(widths[order][mode])
-    glued = float(np.sort(fixed.resonances()[0])[mode])
-    span = max(top - glued, 4 * width, 1e-3 * top)
+    # joints that stick leave fewer modes, with higher frequencies
+    glued = float(([*np.sort(fixed.resonances()[0])[: mode + 1]] or [top])[-1])
+    span = max(abs(top - glued), 4 * width, 1e-3 * top)
     step = 10.0 ** math.floor(math.log10(span))
     low = step * math.floor((min(glued, top) - 1.5 * span) / step) if band.low is None else band.low
-    high = step * math.ceil((top + span) / step) if band.high is None else band.high
+    high = step * math.ceil((max(glued, top) + span) / step) if band.high is None else band.high
     low = max(low, 0.1 * glued) if band.low is None else low
     if not 0.0 < low < high:
         raise InputError(f"frequencies: expected two above zero, the lower one first, not {low:g} and {high:g} Hz")

@@ -134,8 +134,9 @@ def curve_figure(sweep: Sweep, response: ForcedResponse, places: Mapping[str, in
         ("damped_mean", x, response.damped_mean, _CHOSEN, at_points | {"mode": "lines+markers"}),
     ):
         if np.isfinite(values).any():
-            hover = f"{LOOKS[curve].title}: %{{y:.4g}} µm<extra></extra>"
-            figure.add_scatter(**trace(curve, at, 1e6 * values, colour, hovertemplate=hover, **more))
+            name = getattr(response.names, curve, LOOKS[curve].title)
+            hover = f"{name}: %{{y:.4g}} µm<extra></extra>"
+            figure.add_scatter(**trace(curve, at, 1e6 * values, colour, name=name, hovertemplate=hover, **more))
     _add_troubles(figure, sweep, along, places, x)
     _add_best(figure, sweep, along, places, factor)
     figure.update_xaxes(title_text=axis_title(along, unit, response.hertz), hoverformat=".6g")

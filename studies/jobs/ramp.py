@@ -13,6 +13,7 @@ from vanedamp.coupling.transients.ramp_course import ramped
 from vanedamp.coupling.transients.ramp_record import Ramp
 from vanedamp.studies.hot_spots import plus_minus, strength_lines
 from vanedamp.studies.jobs.job import JobResult, Means, SceneJob
+from vanedamp.studies.references import ReferenceNames, reference_names
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ def _summary(result: Ramp, seconds: float) -> Iterator[str]:
             yield f"{'':18} {spot}: largest amplitude of von Mises stress {of['von_mises'] / 1e6:.4g} MPa{error}"
         yield from strength_lines(result.strength(run))
     tops = result.tops
-    for name, what in (("undamped", "without bodies"), ("fixed", "bodies fixed")):
+    names = reference_names(result.scene) or ReferenceNames()
+    for name, what in (("undamped", names.undamped), ("fixed", names.fixed)):
         yield f"steady state, {what}: {tops[f'{name}_peak']:.5g} m at {tops[f'{name}_peak_frequency']:.6g} Hz"
     yield f"{sum(len(run.time) for run in result.runs)} periods in {seconds:.1f} s"

@@ -15,6 +15,7 @@ from vanedamp.studies.headline import without_round_off
 from vanedamp.studies.hot_spots import plus_minus, strength_lines
 from vanedamp.studies.jobs.budget import check_run
 from vanedamp.studies.jobs.job import JobResult, Means, SceneJob, choice_notes
+from vanedamp.studies.references import ReferenceNames, reference_names
 from vanedamp.studies.scene_checks import check_numbers
 
 #: rows of the table that is printed
@@ -52,7 +53,8 @@ def _summary(result: RingDown) -> Iterator[str]:
     """Yield the linear mode, and frequency and damping at some amplitudes."""
     linear, half, cycles = result.linear, result.half_cycles, result.cycles
     yield (
-        f"mode {linear.mode}: {linear.frequency:.6g} Hz, damping ratio {linear.damping_ratio:.6g}; bodies fixed: "
+        f"mode {linear.mode}: {linear.frequency:.6g} Hz, damping ratio {linear.damping_ratio:.6g}; "
+        f"{(reference_names(result.scene) or ReferenceNames()).fixed}: "
         f"{linear.fixed_frequency:.6g} Hz, {linear.fixed_damping_ratio:.6g}"
     )
     yield f"status {result.status.value}: {len(half.time)} half cycles, {result.impacts.sum()} impacts"

@@ -345,10 +345,12 @@ def _measured_sentence(study: Study, nominal: Optimum, robust: Optimum) -> str:
 
 
 def _format_design(design: Design, study: Study) -> str:
-    text = "1 body" if design.bodies == 1 else f"{design.bodies or 'no'} bodies"
+    text = "1 body" if design.bodies == 1 else f"{design.bodies} bodies"
     if design.mass_ratio is not None:
         text += f" of together {design.mass_ratio:.2%} of the mass ({1e3 * design.mass_ratio * study.mass:.3g} g)"
     named = [f"{path} = {value:.4g} {unit_of(path)}".removesuffix(" 1") for path, value in design.numbers]
     if design.gap_ratio is not None:
         named = [f"a gap of {design.gap_ratio:.2f} X ({1e6 * design.gap_ratio * study.amplitude:.3g} µm)", *named]
+    if not design.bodies:
+        return ", ".join(named)
     return f"{text} with {', '.join(named)}" if named else text

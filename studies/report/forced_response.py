@@ -24,6 +24,7 @@ from vanedamp.coupling.system.linear_response import linear_amplitudes, linear_r
 from vanedamp.files.errors import VanedampError
 from vanedamp.files.store import frozen
 from vanedamp.studies.headline import Headline, format_value, headline, leaves, reference_of
+from vanedamp.studies.references import ReferenceNames, reference_names
 
 #: relative difference allowed between a linear amplitude computed again and the sweep's
 _SAME = 1e-6
@@ -58,6 +59,7 @@ class ForcedResponse(QuantityRecord):
     source, colour     the file it comes from; its colour on a page
     peak_known         whether the peak is certain: no failed point can be higher
     design, start      identifiers of the parameters that the designer chooses, and of the start of its runs
+    names              of its linear references
     """
 
     name: str
@@ -72,6 +74,7 @@ class ForcedResponse(QuantityRecord):
     confidence: np.ndarray
     quantities: Mapping[str, np.ndarray]
     headline: Headline
+    names: ReferenceNames
     hertz: float = math.nan
     onset_of: str = "impacts on walls"
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -179,6 +182,7 @@ def response_along(
         hertz=hertz if axis == swept else math.nan,
         onset_of="impacts on walls" if counted or single else "impacts of any kind",
         settings=settings,
+        names=reference_names(sweep.scene) or ReferenceNames(),
         peak_known=bool(ok.any() and amplitude_known(sweep)[point].all() and not (mean[~ok] > mean[ok].max()).any()),
         **cut,
     )  # fmt: skip

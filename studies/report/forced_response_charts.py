@@ -48,15 +48,16 @@ def responses_figure(
             colour = _SHARED if len(owners) > 1 else colours[responses.index(response)]
             group = "without loose bodies" if len(owners) > 1 else response.name
             _add_amplitude(
-                figure, owners, shown, group, response, trace(curve, curves.x, getattr(curves, curve), colour)
-            )
+                figure, owners, shown, group, response,
+                trace(curve, curves.x, getattr(curves, curve), colour, name=getattr(response.names, curve)),
+            )  # fmt: skip
     for response, colour in zip(responses, colours, strict=True):
         gaps = jumps(response.damped_mean, response.confidence, response.reference)
         _add_band(figure, shown, response, colour, gaps)
         for curve in ("damped_max", "damped_mean"):
             drawn = trace(curve, response.x, getattr(response, curve), colour, mode="lines+markers", marker={"size": 4})
             _add_amplitude(figure, [response.name], shown, response.name, response, _parted(drawn, gaps))
-    figure.update_yaxes(title_text=RELATIVE, rangemode="tozero")
+    figure.update_yaxes(title_text=f"amplitude / {responses[0].names.maximum}", rangemode="tozero")
     return _finish(figure, responses, height=560)
 
 

@@ -80,8 +80,8 @@ def summary_picture(mode_png: bytes | None, response: ForcedResponse, path: Path
         left.imshow(imread(io.BytesIO(mode_png)))
         left.set_title("first bending mode of the cluster", fontsize=11)
     curves: list[tuple[np.ndarray, str, dict[str, Any]]] = [
-        (response.undamped, "without bodies", {"color": GREY, "linestyle": ":"}),
-        (response.fixed, "bodies fixed", {"color": GREY, "linestyle": "--"}),
+        (response.undamped, response.names.undamped, {"color": GREY, "linestyle": ":"}),
+        (response.fixed, response.names.fixed, {"color": GREY, "linestyle": "--"}),
         (response.damped_max, "loose bodies, maximum", {"color": "#9fc1ea", "marker": ".", "linewidth": 0.8}),
         (response.damped_mean, "loose bodies, mean of peaks", {"color": "#1f5fa8", "linewidth": 2.0}),
     ]

@@ -89,6 +89,9 @@ def _hold_slider(system, st, scratch, r, slow):
     One whose spring is at its bound while its driver is at rest is marked: its acceleration decides. A slider that
     has moved until now is at its bound. Without a bound, as a contact begins to press, it goes as its driver does.
     """
+    if not has_friction(system, r):
+        st.state[r] = SLIP_RIGHT
+        return
     j, stretched, terms = system.slider[r], 0.0, 0.0
     for i in range(len(st.q)):
         term = system.elongation[j, i] * st.q[i]

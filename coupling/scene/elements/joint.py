@@ -91,8 +91,7 @@ class Joint(SceneElement):
     @property
     def sliders(self) -> int:
         """Number of its units that have a spring along."""
-        springs = self.tangential_stiffness is not None or self.residual
-        return int(springs and self.friction > 0.0)
+        return int(self.tangential_stiffness is not None or self.residual)
 
     def labels(self) -> Mapping[str, str | None]:
         """Return the labels of its points, by key and place."""

@@ -14,6 +14,7 @@ from vanedamp.coupling.quantities.quantity import table
 from vanedamp.coupling.scene.rotation import SPEEDS, hertz_of
 from vanedamp.coupling.transients.lewis import peak_ratio
 from vanedamp.coupling.transients.ramp_record import Ramp, RampRun
+from vanedamp.studies.references import ReferenceNames, reference_names
 from vanedamp.studies.report.charts import COLOURS, Chart, Table, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.strength import course_chart
@@ -75,13 +76,14 @@ def run_name(ramp: Ramp, run: RampRun) -> str:
 
 def figure(ramp: Ramp, beside: Mapping[str, tuple[np.ndarray, np.ndarray]] = MappingProxyType({})) -> go.Figure:
     """Draw amplitudes versus frequency, of runs and the linear structure, and the points of sweeps by their names."""
-    figure, x = go.Figure(), along(ramp)
+    figure, x, held = go.Figure(), along(ramp), reference_names(ramp.scene)
+    names = held or ReferenceNames()
     rates = list(dict.fromkeys(abs(run.rate) for run in ramp.runs))
     for name, title, dash in (
-        ("undamped", "steady state, without bodies", "dot"),
-        ("fixed", "bodies fixed", "dashdot"),
+        ("undamped", f"steady state, {names.undamped}", "dot"),
+        ("fixed", names.fixed, "dashdot"),
     ):
-        if name == "undamped" or ramp.scene.damper:
+        if name == "undamped" or held:
             figure.add_scatter(
                 x=ramp.curves[x], y=1e6 * ramp.curves[name], name=title, mode="lines",
                 line={"color": _STATIONARY, "dash": dash, "width": 1.6}, hovertemplate="%{x:.6g}: %{y:.5g} µm",

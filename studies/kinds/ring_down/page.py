@@ -12,6 +12,7 @@ from plotly.subplots import make_subplots
 from scipy.ndimage import median_filter
 
 from vanedamp.coupling.transients.ring_down_record import RingDown
+from vanedamp.studies.references import ReferenceNames, reference_names
 from vanedamp.studies.report.charts import COLOURS, dressed
 from vanedamp.studies.report.page import Page
 from vanedamp.studies.report.strength import course_chart
@@ -91,10 +92,11 @@ def figure(record: RingDown) -> go.Figure:
     if record.table.bins:
         for name, colour, col in (("frequency", _DARK, 1), *((name, colour, 2) for name, _, colour in estimates)):
             _add_bins(figure, record, name, colour, col)
-    _add_line(figure, linear.frequency, "without bodies", "solid", 1)
-    _add_line(figure, linear.fixed_frequency, "bodies fixed", "dash", 1)
+    names = reference_names(record.scene) or ReferenceNames()
+    _add_line(figure, linear.frequency, names.undamped, "solid", 1)
+    _add_line(figure, linear.fixed_frequency, names.fixed, "dash", 1)
     if linear.damping_ratio > 0.0:
-        _add_line(figure, linear.damping_ratio, "without bodies", "solid", 2)
+        _add_line(figure, linear.damping_ratio, names.undamped, "solid", 2)
     figure.update_xaxes(title_text="time, ms", row=1, col=1)
     figure.update_yaxes(title_text="turning points, µm", row=1, col=1)
     for col in (1, 2):

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.linalg import eigh
 
 from vanedamp.coupling.model_order.choices import leaves_open
 from vanedamp.coupling.model_order.selection import warnings_of
@@ -18,18 +17,20 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Prescribed, Rom
 from vanedamp.coupling.sweep.grid import Points, base_scene, grid
 from vanedamp.coupling.system.assembly import assemble
-from vanedamp.coupling.system.linear_response import fixed_mass, linear_amplitudes, linear_responses
+from vanedamp.coupling.system.linear_response import fixed_mode, linear_amplitudes, linear_response, linear_responses
 from vanedamp.coupling.system.modal_basis import basis_of
 from vanedamp.coupling.system.onset import onsets
 from vanedamp.coupling.system.resonance import Resonance, chosen_resonance, excitation_force
 from vanedamp.coupling.system.sectors import unrolled
 from vanedamp.coupling.system.transient import left_over, timed
+from vanedamp.files.store import finite
 from vanedamp.files.toml_input import InputError
 from vanedamp.studies.commands.support.facts.scene_doubts import gap_doubts, part_doubts, sweep_doubts
 from vanedamp.studies.facts import Fact
 from vanedamp.studies.jobs.budget import beginning, check_run, check_sweep, exponent_seconds, points_of
 from vanedamp.studies.jobs.trial import mean_cost, tried
 from vanedamp.studies.jobs.workers import available_cores
+from vanedamp.studies.references import ReferenceNames, reference_names
 from vanedamp.studies.scene_checks import load_scene
 
 #: natural frequencies that are listed
@@ -115,6 +116,8 @@ def _of_level(scene: Scene, resonance: Resonance | None) -> Iterator[Fact]:
     yield Fact("frequency_hz", scene.frequency, "Hz", "of the excitation")
     if scene.excitation.signal is not None:
         return
+    names = reference_names(scene)
+    free, held, _ = names or ReferenceNames()
     undamped, fixed = linear_amplitudes(scene, np.array([scene.frequency]))
     if not isinstance(scene.structure, Prescribed):
         name, unit = ("load_factor", "") if scene.excitation.distributed else ("force", "N")
@@ -122,11 +125,16 @@ def _of_level(scene: Scene, resonance: Resonance | None) -> Iterator[Fact]:
         static = linear_responses(scene)[0].amplitude(np.zeros(1))
         yield Fact("static_amplitude", float(static[0]), "m", "under the same load at rest")
     if resonance is not None:
-        yield Fact("resonance_hz", resonance.frequency, "Hz", f"mode {resonance.mode + 1}, without bodies")
+        yield Fact("resonance_hz", resonance.frequency, "Hz", f"mode {resonance.mode + 1}, {free}")
         yield Fact("resonance_amplitude", _top(scene, resonance), "m", "X, there")
         yield Fact("modal_mass", resonance.mass, "kg", "of that mode at the response")
-    yield Fact("amplitude_undamped", float(undamped[0]), "m", "at the excitation's frequency, without bodies")
-    yield Fact("amplitude_fixed", float(fixed[0]), "m", "there, with all bodies fixed")
+        if names:
+            system = assemble(scene)
+            motion = linear_response(system, False).motion(resonance.frequency)[0]
+            hertz = fixed_mode(system, motion)[0] / (2 * np.pi)
+            yield Fact("fixed_hz", finite(hertz), "Hz", f"of the mode most like it, {held}")
+    yield Fact("amplitude_undamped", float(undamped[0]), "m", f"at the excitation's frequency, {free}")
+    yield Fact("amplitude_fixed", float(fixed[0]), "m", f"there, {held}")
 
 
 def _resonance(scene: Scene) -> Resonance | None:
@@ -149,10 +157,7 @@ def _of_bodies(scene: Scene, resonance: Resonance | None) -> Iterator[Fact]:
         return
     masses = [damper.mass for damper in scene.damper]
     if resonance is not None:
-        system = assemble(scene)
-        squares = eigh(np.diag(system.of_structure.stiffness), fixed_mass(system), eigvals_only=True)
         yield Fact("mass_ratio", sum(masses) / resonance.mass, "", "of all bodies to the modal mass")
-        yield Fact("fixed_hz", float(np.sqrt(squares[resonance.mode]) / (2 * np.pi)), "Hz", "with all bodies fixed")
         if scene.excitation.signal is None:
             amplitude = _top(scene, resonance)
             ratios = [cavity.gap / amplitude for cavity in scene.cavity] if amplitude else []

@@ -20,6 +20,7 @@ from vanedamp.files.toml_input import InputError
 from vanedamp.modal.units import strength_absurdity
 from vanedamp.studies.headline import headline
 from vanedamp.studies.machining import fine_gap
+from vanedamp.studies.references import reference_names
 
 #: gaps beyond this many amplitudes are slips of units, as a rule
 _WIDE = 20.0
@@ -49,7 +50,7 @@ def sweep_doubts(scene: Scene) -> Iterator[str]:
         return
     undamped, fixed = np.reshape(curves, (len(x), 2)).T
     peaks = {name: float(values) for name, values in linear_tops(points).items()}
-    damped = fixed if scene.damper else undamped  # the damped peak lies between them, as a rule
+    damped = fixed if reference_names(scene) else undamped  # the damped peak lies between them, as a rule
     none = np.zeros(len(x))
     found = headline(x, damped, damped, none, none, none, undamped, fixed, peaks, along_frequency=True)
     unit = "Hz" if swept == FREQUENCY else unit_of(swept)
