@@ -31,6 +31,10 @@ def held(mass, stiffness, damping, rows, load):
     ("joint", "more", "rigid", "spring"),
     [
         ({"preload": 5.0, "normal_stiffness": 1e5}, {}, ALONG, 1e5 * ACROSS.T @ ACROSS),
+        (
+            {"friction": 0.0, "preload": 5.0, "normal_stiffness": 1e5, "tangential_stiffness": 3e4}, {}, NONE,
+            1e5 * ACROSS.T @ ACROSS + 3e4 * ALONG.T @ ALONG,
+        ),
         ({"friction": 0.0}, {}, np.vstack([ALONG, ACROSS]), 0.0),
         ({"gap": 1e-5, "normal_stiffness": 1e5}, {}, NONE, 0.0),
         ({"preload_by_speed": 1e-3}, {"rotation": {"speed": 0.0}}, np.vstack([ALONG, ACROSS]), 0.0),

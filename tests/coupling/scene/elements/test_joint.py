@@ -244,8 +244,9 @@ def test_other_methods_converge_to_it(kind, solver, tolerance):
     assert other.amplitude_mean == pytest.approx(exact.amplitude_mean, rel=tolerance)
 
 
-def test_a_sweep_is_its_runs():
-    joint = JOINT | {"normal_stiffness": 1e5, "preload": 8.0}
+@pytest.mark.parametrize("along", [{}, {"tangential_stiffness": 3e4}])
+def test_a_sweep_is_its_runs(along):
+    joint = JOINT | {"normal_stiffness": 1e5, "preload": 8.0} | along
     made = scene(matrices(0), joint, time={"periods": 30, "transient": 20})
     axes = {"joint.0.preload": [0.0, 8.0, 40.0], "joint.0.friction": [0.0, 0.4], "excitation.frequency": [17.0, 22.0]}
     swept = vd.sweep(made.replace({"sweep": axes}))
