@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from functools import lru_cache
 from typing import Any
 
 from pydantic import GetJsonSchemaHandler, TypeAdapter, model_serializer, model_validator
@@ -13,6 +14,9 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import ArgsKwargs, CoreSchema, SchemaValidator, core_schema
 
 from vanedamp.files.toml_input import STRICT
+
+#: validators kept
+_KEPT = 100
 
 
 @dataclass(frozen=True, config=STRICT, repr=False)
@@ -50,8 +54,7 @@ class OpenRecord:
     @classmethod
     def _validated(cls, values: Mapping[str, Any], types: Mapping[str, Any]) -> dict[str, Any]:
         """Return the values of keys that other code adds, by their types. Raises pydantic's ValidationError."""
-        schemas = {key: core_schema.typed_dict_field(_schema(types[key])) for key in values}
-        found: dict[str, Any] = SchemaValidator(core_schema.typed_dict_schema(schemas)).validate_python(values)
+        found: dict[str, Any] = _validator(tuple((key, types[key]) for key in values)).validate_python(values)
         return found
 
     @model_serializer(mode="wrap")
@@ -69,6 +72,13 @@ class OpenRecord:
             about = next((one.description for one in told), None)
             properties[key] = handler(_schema(kind)) | ({} if about is None else {"description": about})
         return json_schema
+
+
+@lru_cache(_KEPT)
+def _validator(kinds: tuple[tuple[str, Any], ...]) -> SchemaValidator:
+    """Return what validates tables of these keys and types."""
+    schemas = {key: core_schema.typed_dict_field(_schema(kind)) for key, kind in kinds}
+    return SchemaValidator(core_schema.typed_dict_schema(schemas))
 
 
 def _schema(kind: Any) -> CoreSchema:

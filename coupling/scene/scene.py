@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import field
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from shutil import copyfile
 from typing import Annotated, Any, Literal, Self
@@ -322,12 +322,7 @@ class Scene(OpenRecord, Displayed):
     def keys_added(cls) -> Mapping[str, Any]:
         """Return the tables of elements that are no fields."""
         names = [name for name in ELEMENTS.names() if name not in cls.__dataclass_fields__]
-        parts = {name: ELEMENTS.part(name) for name in names}
-        about = {name: (part.__doc__ or name).partition("\n")[0].rstrip(".") for name, part in parts.items()}
-        return {
-            name: Annotated[tuple.__class_getitem__((part, ...)), Field(description=about[name])]
-            for name, part in parts.items()
-        }
+        return {name: _list_of(ELEMENTS.part(name)) for name in names}
 
     def _check_plane(self) -> None:
         """Raise ValueError where a scene with planar bodies lacks or has something that they cannot do with."""
@@ -669,3 +664,10 @@ def loaded(scene: Scene | str | Path) -> Scene:
     if isinstance(scene, str | Path):
         return Scene.load(scene)
     raise InputError(f"scene: expected a Scene or its TOML file, not {type(scene).__name__}")
+
+
+@cache
+def _list_of(part: Any) -> Any:
+    """Return the type of a list of tables of an element, the same each time: what validates it is built once."""
+    about = (part.__doc__ or part.__name__).partition("\n")[0].rstrip(".")
+    return Annotated[tuple.__class_getitem__((part, ...)), Field(description=about)]
