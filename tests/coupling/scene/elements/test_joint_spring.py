@@ -276,6 +276,7 @@ def test_a_wedge_between_platforms_is_a_part_with_two_joints(load, frequency):
     blade = 1e5 * np.array([[3.0, -1.0, 0.3], [-1.0, 1.0, 0.0], [0.3, 0.0, 20.0]])  # platform, tip, platform's height
     mass, stiffness = np.r_[np.full(6, 0.1), 0.02, 0.02], np.zeros((8, 8))
     stiffness[:3, :3] = stiffness[3:6, 3:6] = blade
+    stiffness[6, 6] = stiffness[7, 7] = 10.0
     damping = 2e-5 * stiffness
     labels, rows = {"tip": 1, "tip_b": 4}, np.zeros((2, 2, 8))
     for j, (platform, side) in enumerate(((0, 1.0), (3, -1.0))):
