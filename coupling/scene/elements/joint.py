@@ -131,7 +131,10 @@ class Joint(SceneElement):
 
         def apart(key: str) -> np.ndarray:
             motions = [sign * parts.motion(label, f"joint[{number}].{key}") for label, sign in shares(key).items()]
-            return np.sum(motions, axis=0)
+            row = np.sum(motions, axis=0)
+            if not row.any():
+                raise InputError(f"joint[{number}].{key}: {' and '.join(shares(key))} do not move on each other")
+            return row
 
         def stiffness(key: str, given: float | None) -> float:
             yields = (1.0 / given if given else 0.0) + self.residual * parts.flexibility(shares(key))

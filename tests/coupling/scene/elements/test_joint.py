@@ -18,7 +18,7 @@ from vanedamp.rom.reduced import ReducedModel
 from vanedamp.rom.ring.reduction import reduce_ring
 
 OPEN, STICK = "open", "held"
-LABELS = {"a": 0, "a_across": 1, "b": 2, "b_across": 3}
+LABELS = {"a": 0, "a_across": 1, "b": 2, "b_across": 3, "same": 1}
 JOINT = {"between": ["a", "b"], "normal": ["a_across", "b_across"], "friction": 0.4}
 
 
@@ -318,6 +318,7 @@ def test_wear_is_friction_work_over_friction():
         ({"gap": 1e-4, "preload": 2.0}, "gap: a joint that is open at rest has no preload"),
         ({"between": ["a", "x"]}, "joint[0].between: no interface label 'x'"),
         ({"friction": -0.1}, "friction: "),
+        ({"normal": ["a_across", "same"]}, "joint[0].normal: a_across and same do not move on each other"),
         ({"friction": 50.0, "preload": 1.0}, "joint[0].friction: 50 lets the structure jam"),
     ],
 )
