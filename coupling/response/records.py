@@ -42,14 +42,15 @@ class Records(NamedTuple):
     shut: np.ndarray  # (periods * s, u) int: whether contacts are closed there
     log: np.ndarray  # (capacity, WIDTH or LINE_WIDTH) entries of a slice (response.event_log)
     swing: np.ndarray  # (., 3): largest and smallest x, m, and its integral, m s; (0, 3): bodies bring no static load
-    worn: np.ndarray  # (periods + 1, w) work of friction of each row of the log, J; w = 0: not wanted
+    # (periods + 1, w) work of friction of each row of the log, J; w = 0: not wanted; in the plane from `counted` on
+    worn: np.ndarray
     struck: np.ndarray  # (periods + 1, w) sum over its impacts of their energy to the power `exponent`, J^exponent
     hits: np.ndarray  # (periods + 1, w) its impacts
     exponent: np.ndarray  # (1,)
     # (periods + 1, k, 3) of further outputs (System.outputs): largest |value|, or where bodies bring a static load as
     # `swing`; -inf: not noted; k = 0: not wanted
     outputs: np.ndarray
-    counted: np.ndarray  # (1,) int: period from which on they are noted, and the course
+    counted: np.ndarray  # (1,) int: period from which on they are noted, the course, and work of friction in the plane
     # (rows, 2 + 4k) course of the further outputs (energy_forms): the period, the time to the next row, s, 0 at the end
     # of a segment, the outputs, and their first three derivatives; rows = 0: not wanted
     course: np.ndarray

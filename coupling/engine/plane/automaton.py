@@ -170,7 +170,7 @@ def _move(system, flows, st, rec, scratch, tau):
     """Advance the motion by tau > 0, with its integrals and samples."""
     q, v = scratch.later[0], scratch.later[1]
     _sample(system, flows, st, rec, scratch, tau, q, v)
-    if rec.worn.shape[1] > 0 and flows.rubs[st.counters[FLOW]]:
+    if rec.worn.shape[1] > 0 and st.counters[PERIOD] >= rec.counted[0] and flows.rubs[st.counters[FLOW]]:
         add_friction_work(system, flows, st, rec, scratch, tau)
     move(system, flows, st, scratch, tau, q, v)
     end_segment(system, flows, st, rec, scratch, tau, q, v)
