@@ -176,6 +176,53 @@ def test_a_joint_that_sticks_from_case_to_scene_against_the_own_matrices(built, 
     assert response.amplitude_mean == pytest.approx(expected, rel=1e-5)
 
 
+def stepped(squares, rows, joint, load, frequency, periods, steps):
+    """Motion of the shroud, 100 times per period, by exact steps of all modes under the joint's force at midpoints."""
+    (tip, along, across), (preload, spring, tangential, friction) = rows, joint
+    h, natural, ratio = 1 / frequency / steps, np.sqrt(squares), 0.02
+    damped, decay = natural * np.sqrt(1 - ratio**2), np.exp(-ratio * natural * h)
+    cosine, sine = decay * np.cos(damped * h), decay * np.sin(damped * h) / damped
+    stay, go, turn, keep = (
+        cosine + ratio * natural * sine, sine, -squares * sine, cosine - ratio * natural * sine
+    )  # fmt: skip
+    q, v, slider, kept = np.zeros(len(squares)), np.zeros(len(squares)), 0.0, []
+    for step in range(periods * steps):
+        if step % (steps // 100) == 0:
+            kept.append(tip @ q)
+        middle = q + 0.5 * h * v
+        push, driver = max(preload - spring * (across @ middle), 0.0), along @ middle
+        bound = friction * push / tangential
+        slider = min(max(slider, driver - bound), driver + bound)
+        force = load * np.sin(2 * np.pi * (step + 0.5) / steps) * tip
+        force = force + (push - preload) * across - tangential * (driver - slider) * along
+        q, v = stay * q + go * v + (1 - stay) / squares * force, turn * q + keep * v - turn / squares * force
+    return np.array(kept)
+
+
+def test_a_joint_that_slips_against_small_steps_of_all_finite_elements(built):
+    """With more fixed-interface modes the reduced model tends to it."""
+    structure, frequency, load, periods = built(), 330.0, 2e4, 3
+    matrices = structure.matrices
+    stiffness, mass = (matrices.of_free(one).toarray() for one in (matrices.stiffness, matrices.mass))
+    squares, shapes = linalg.eigh(stiffness, mass)
+    made = interface(structure.case, matrices, ["shroud", "platform"])
+    tip, first, first_across, second, second_across = made.vectors.T[:, matrices.free] @ shapes
+    joint = {"preload": 2e3, "normal_stiffness": 3e9, "tangential_stiffness": 2e9, "friction": 0.3}
+    rows = tip, first - second, first_across - second_across
+    own = stepped(squares, rows, tuple(joint.values()), load, frequency, periods, 8000)
+    errors = []
+    for modes in (0, 30):
+        scene = vd.Scene(
+            structure=reduction(structure, modes=modes),
+            excitation={"frequency": frequency, "force": load, "at": "shroud"},
+            joint=[joint | {"at": "platform"}], time={"periods": periods, "transient": 0},
+        )  # fmt: skip
+        response = vd.simulate(scene, samples_per_period=100, events=True)
+        assert "slip" in {event.kind for event in response.event_list}
+        errors.append(np.abs(response.displacement[: 100 * periods] - own).max() / np.abs(own).max())
+    assert errors[1] < 2e-4 < 1e-2 < errors[0]
+
+
 def test_a_joint_in_a_ring_has_its_second_side_in_the_next_sector():
     joint, written = Joint(at="p@+1", friction=0.3), ("p_1", "p_2@+1")
     assert (joint.between, joint.normal) == (written, ("p_1_across", "p_2_across@+1"))
