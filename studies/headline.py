@@ -14,9 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vanedamp.files.toml_input import plain
+from vanedamp.studies.references import ReferenceNames
 
 #: results below this fraction of their scale are round-off
 _ROUND_OFF = 1e-12
+_NAMES = ReferenceNames()
 
 
 class _Top(NamedTuple):
@@ -85,11 +87,11 @@ class Headline:
         """Reasons why the ratio does not compare two resonance peaks, along the frequency."""
         return self.remarks_in("Hz")
 
-    def remarks_in(self, units: str, left_out: bool = True) -> list[str]:
-        """Return these reasons; units: of the axis; left_out: points that are not ok among them."""
+    def remarks_in(self, units: str, left_out: bool = True, names: ReferenceNames = _NAMES) -> list[str]:
+        """Return these reasons; units: of the axis; left_out: points not ok among them; names: of the references."""
         remarks = []
         if self.undamped_at_edge:
-            remarks.append("no resonance without bodies lies within the range")
+            remarks.append(f"no {names.of('resonance')} lies within the range")
         if self.peak_at_edge:
             remarks.append("the damped peak lies at an edge of the range, and may be higher beyond it")
         if self.too_coarse:
@@ -101,15 +103,17 @@ class Headline:
             remarks.append(f"{self.points_left_out} of {self.points} points are left out, which are not ok")
         return remarks
 
-    def sentence(self, axis: str, units: str, low: Any, high: Any, along_frequency: bool) -> str:
-        """Return the headline for people; low, high: the range along the axis."""
+    def sentence(
+        self, axis: str, units: str, low: Any, high: Any, along_frequency: bool, names: ReferenceNames = _NAMES
+    ) -> str:
+        """Return the headline for people; low, high: the range along the axis; names: of its references."""
         unit = "" if units == "1" else f" {units}"
         if not math.isfinite(self.damped_peak):
             return f"no damped peak: {self.points_left_out} of {self.points} points are not ok"
         at = f"{axis} = {format_value(self.damped_peak_at)}{unit}"
         if not math.isfinite(self.peak_ratio):
             unbounded = self.undamped_peak == math.inf
-            compared = "that without bodies has no bound" if unbounded else "none without bodies to compare with"
+            compared = f"that {names.undamped} has no bound" if unbounded else f"none {names.undamped} to compare with"
             text = (
                 f"damped peak (mean) {self.damped_peak:.4g} m, at {at}, largest amplitude {self.damped_maximum:.4g} m; "
                 f"{compared}"
@@ -117,15 +121,15 @@ class Headline:
         elif self.undamped_at_edge or not along_frequency:
             text = (
                 f"highest damped mean {self.peak_ratio:.3f}, largest amplitude {self.maximum_ratio:.3f} of the highest "
-                f"amplitude without bodies {self.undamped_peak:.4g} m from {format_value(low)} to "
+                f"{names.of('amplitude')} {self.undamped_peak:.4g} m from {format_value(low)} to "
                 f"{format_value(high)}{unit}, at {at}"
             )
         else:
             text = (
-                f"damped peak (mean) {self.peak_ratio:.3f}, largest amplitude {self.maximum_ratio:.3f} of the maximum "
-                f"without bodies {self.undamped_peak:.4g} m, at {at}"
+                f"damped peak (mean) {self.peak_ratio:.3f}, largest amplitude {self.maximum_ratio:.3f} of the "
+                f"{names.maximum} {self.undamped_peak:.4g} m, at {at}"
             )
-        return "; ".join([text, *self.remarks_in(units)])
+        return "; ".join([text, *self.remarks_in(units, names=names)])
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""

@@ -14,6 +14,15 @@ class ReferenceNames(NamedTuple):
     fixed: str = "bodies fixed"
     maximum: str = "maximum without bodies"
 
+    def of(self, what: str) -> str:
+        """Return the name of something else than the maximum of the first structure."""
+        return self.maximum.replace("maximum", what)
+
+    @property
+    def held(self) -> str:
+        """The name of the second structure in one word."""
+        return self.fixed.split()[-1]
+
 
 def reference_names(scene: Scene) -> ReferenceNames | None:
     """Return the names of the linear references of a scene; None where nothing holds the structure."""

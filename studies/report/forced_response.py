@@ -92,7 +92,8 @@ class ForcedResponse(QuantityRecord):
     @property
     def sentence(self) -> str:
         """The headline in words."""
-        sentence = self.headline.sentence(self.axis, self.units, self.x[0], self.x[-1], math.isfinite(self.hertz))
+        low, high, along = self.x[0], self.x[-1], math.isfinite(self.hertz)
+        sentence = self.headline.sentence(self.axis, self.units, low, high, along, self.names)
         return f"{self.name}: {sentence}"
 
     def to_json(self) -> dict[str, Any]:
@@ -251,8 +252,9 @@ def quantity(value: Any, units: str) -> str:
 
 
 def setting(path: str, value: Any, units: str) -> str:
-    """Return a key and its value in short, such as "c1.gap = 20 µm"."""
-    return f"{path.split('.', 1)[-1]} = {quantity(value, units)}"
+    """Return a key and its value in short, such as "c1.gap = 20 µm"; entries without a name keep their table's."""
+    short = path.split(".", 1)[-1]
+    return f"{path if short[0].isdecimal() else short} = {quantity(value, units)}"
 
 
 def resonance_grid(start: float, stop: float, peaks: list[float], width: float, num: int) -> np.ndarray:

@@ -152,15 +152,18 @@ def _add_panels(
 
 
 def mistuning_figure(responses: Sequence[ForcedResponse], shown: Collection[str] | None = None) -> go.Figure:
-    """Draw attached mass fraction and impacts per period; shown: as of `responses_figure`."""
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
+    """Draw impacts per period and, with bodies, their attached mass fraction; shown: as of `responses_figure`."""
+    attached = any(np.isfinite(response.attached_mass_fraction).any() for response in responses)
+    rows = 1 + attached
+    figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     for response, colour in zip(responses, cycle(responses), strict=True):
-        panels = ((response.attached_mass_fraction, None), (response.impacts_per_period, None))
+        panels = ((response.attached_mass_fraction, None), (response.impacts_per_period, None))[-rows:]
         _add_panels(figure, response, shown, response.name, {"color": colour}, panels)
-    figure.add_hline(y=1, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
-    figure.update_yaxes(title_text="attached mass fraction", row=1, col=1)
-    figure.update_yaxes(title_text="impacts per period", rangemode="tozero", row=2, col=1)
-    return _finish(figure, responses, height=560)
+    if attached:
+        figure.add_hline(y=1, line={"color": "#94a3b8", "width": 1, "dash": "dash"}, row=1, col=1)
+        figure.update_yaxes(title_text="attached mass fraction", row=1, col=1)
+    figure.update_yaxes(title_text="impacts per period", rangemode="tozero", row=rows, col=1)
+    return _finish(figure, responses, height=280 * rows)
 
 
 def energy_figure(responses: Sequence[ForcedResponse]) -> go.Figure:

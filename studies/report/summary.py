@@ -15,6 +15,7 @@ from vanedamp.coupling.scene.structures import Prescribed, Rigid
 from vanedamp.coupling.sweep.grid import base_scene
 from vanedamp.studies.headline import format_value
 from vanedamp.studies.hot_spots import plus_minus
+from vanedamp.studies.references import ReferenceNames
 from vanedamp.studies.report.designs import DesignCurves, designs
 from vanedamp.studies.report.forced_response import linear_curves, model_name
 from vanedamp.studies.report.forced_response_charts import responses_figure
@@ -108,13 +109,21 @@ def _answer(design: DesignCurves, count: int) -> list[str]:
     if not math.isfinite(headline.peak_ratio):
         return [f"{design.sentence}."]
     at = f"{format_value(headline.damped_peak_at)}{unit}"
+    damped, free, fixed, quiet = "", best.names.undamped, best.names.fixed, "Without impacts"
+    if best.names == ReferenceNames():
+        damped, free, fixed, quiet = (
+            "with the bodies ",
+            "without them",
+            "with the bodies fixed",
+            "The bodies hit no wall",
+        )
     first = (
-        f"{which} ({best.name}): with the bodies the highest mean amplitude is {1e6 * headline.damped_peak:.4g} µm "
+        f"{which} ({best.name}): {damped}the highest mean amplitude is {1e6 * headline.damped_peak:.4g} µm "
         f"at {at}, the largest amplitude {1e6 * headline.damped_maximum:.4g} µm, "
-        f"without them {1e6 * headline.undamped_peak:.4g} µm at {format_value(headline.undamped_peak_at)}{unit}: "
+        f"{free} {1e6 * headline.undamped_peak:.4g} µm at {format_value(headline.undamped_peak_at)}{unit}: "
         f"{headline.peak_ratio:.1%} is left, at its largest {headline.maximum_ratio:.1%}"
     )
-    onset = "The bodies hit no wall"
+    onset = quiet
     if headline.onset is not None:
         ok_x = best.x[np.isfinite(best.damped_mean)]
         first_point = ""
@@ -124,11 +133,11 @@ def _answer(design: DesignCurves, count: int) -> list[str]:
     if headline.touched_below is not None:
         onset += f"; below, from {format_value(headline.touched_below)}{unit} on, a body hits its floor or ceiling"
     second = (
-        f"{onset}; with the bodies fixed the maximum would be {1e6 * headline.fixed_peak:.4g} µm at "
+        f"{onset}; {fixed} the maximum would be {1e6 * headline.fixed_peak:.4g} µm at "
         f"{format_value(headline.fixed_peak_at)}{unit}."
     )
     first = "; ".join([first, *design.remarks]) + "."
-    return [first, "; ".join([second.removesuffix("."), *headline.remarks_in(best.units)]) + "."]
+    return [first, "; ".join([second.removesuffix("."), *headline.remarks_in(best.units, names=best.names)]) + "."]
 
 
 def _of_run(measures: Any) -> str:

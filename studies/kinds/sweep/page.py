@@ -113,6 +113,7 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
     linear = [linear_curves(sweeps[response.source], response) for response in responses]
     panels = [response for response in responses if np.isfinite(response.energy_share).any()]
     panels = panels if page.study is not None else panels[:_MOST_PANELS]
+    loose = any(np.isfinite(response.attached_mass_fraction).any() for response in responses)
     figures = {
         "response": responses_figure(responses, linear, shown),
         "mistuning": mistuning_figure(responses, shown),
@@ -137,7 +138,7 @@ def _group(responses: Sequence[ForcedResponse], sweeps: Mapping[str, Sweep], pag
     return charts | {
         "axis": axis, "units": responses[0].units, "onset_of": max((curve.onset_of for curve in responses), key=len),
         "rows": rows, "every": every, "panels": len(panels), "at_peaks": list(_at_peaks(responses, shown)),
-        "picks": len(rows) > 1,
+        "picks": len(rows) > 1, "names": responses[0].names, "loose": loose,
     }  # fmt: skip
 
 

@@ -164,6 +164,7 @@ def test_files_and_pages_have_it(tmp_path):
     assert "friction of the contacts, and fractions of the time" in page
     assert f"<td>{run.contact_friction[0].power:.4g}</td>" in page
     assert "Friction of the joints at the largest mean amplitude" in page and "sticks, fraction of time" in page
+    assert "<th>free maximum, µm</th>" in page and "with the bodies" not in page
 
 
 def test_scenes_without_joints_and_methods_with_steps_have_none():
