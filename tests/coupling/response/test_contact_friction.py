@@ -164,7 +164,15 @@ def test_files_and_pages_have_it(tmp_path):
     assert "friction of the contacts, and fractions of the time" in page
     assert f"<td>{run.contact_friction[0].power:.4g}</td>" in page
     assert "Friction of the joints at the largest mean amplitude" in page and "sticks, fraction of time" in page
-    assert "<th>free maximum, µm</th>" in page and "with the bodies" not in page
+
+
+def test_a_page_without_bodies_speaks_of_free_and_stuck(tmp_path):
+    made = scene(matrices(0), JOINT | {"normal_stiffness": 1e5, "preload": 8.0}, time={"periods": 30, "transient": 20})
+    vd.sweep(made.replace({"sweep": {"excitation.frequency": [17.0, 22.0, 27.0]}})).save(tmp_path / "sweep.h5")
+    assert main(["report", str(tmp_path / "sweep.h5"), "-o", str(tmp_path / "page.html")]) == 0
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<th>free maximum, µm</th>" in page and "stuck the maximum would be" in page
+    assert "with the bodies" not in page and "without bodies" not in page
 
 
 def test_scenes_without_joints_and_methods_with_steps_have_none():
