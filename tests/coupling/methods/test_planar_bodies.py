@@ -275,7 +275,7 @@ def test_solve_ivp_on_compliant_contacts_with_friction(seed):
         [
             (event.damper, event.side, event.corner, event.relative_velocity_before, event.impulse)
             for event in events_of(other.rows, other.log)
-            if event.kind == "impact"
+            if event.kind == "impact" and event.impulse > 0.0  # one that goes on may have begun earlier by round-off
         ]
         for other in (run.outcome(), exact.outcome())
     )
