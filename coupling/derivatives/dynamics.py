@@ -93,8 +93,7 @@ class ScaledDynamics:
             [own_unit[0][:, None] * drawn / self.unit[:size], own_unit[1][:, None] * drawn / self.root]
         )
         self.bound = own_unit[0] * system.limit[self.sprung] / system.tangential
-        springs = np.where(self.sprung < system.contacts, system.spring[self.sprung], 0.0)
-        self.ease = own_unit[0] * system.friction[self.sprung] * springs / system.tangential
+        self.ease = own_unit[0] * system.ease
         self.pulled = system.elongation / self.root
         self.response = zeros(sine.stop)
         self.response[self.places] = system.response / self.unit[:size]

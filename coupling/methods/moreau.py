@@ -229,13 +229,8 @@ def _list_rows(system, motion, problem, h, theta, turn):
     u, count, free, slowest = len(system.rest), ZERO, motion.coordinates[_FREE], motion.slowest[0]
     for rank in range(u):
         r = problem.order[rank]
-        slip, yields = row_speed(system, u + r, free), 0.0
-        if system.slider[r] >= 0:
-            slip, yields = _on_spring(
-                h, theta, system.tangential[system.slider[r]], 0.0, elongation(system, system.slider[r], motion.q),
-                motion.before[u + r], motion.impulse[u + r], slip,
-            )  # fmt: skip
         if r >= system.contacts:
+            slip, yields = _slip(system, motion, r, h, theta)
             low, high = -h * system.limit[r] - motion.impulse[u + r], h * system.limit[r] - motion.impulse[u + r]
             list_row(problem, count, u + r, slip, low, high, yields)
             count += 1
@@ -261,8 +256,22 @@ def _list_rows(system, motion, problem, h, theta, turn):
             )
             list_row(problem, count, r, now, -motion.impulse[r], math.inf, soft)
             bound, had = system.friction[r] * motion.impulse[r], motion.impulse[u + r]
+        slip, yields = _slip(system, motion, r, h, theta)
         count = list_slip(system, problem, count, r, slip, bound, had, yields)
     return count
+
+
+@inlined
+def _slip(system, motion, r, h, theta):
+    """Return speed and compliance of the slip of a unit, which may have a spring and a slider behind it."""
+    row, j = len(system.rest) + r, system.slider[r]
+    slip, yields = row_speed(system, row, motion.coordinates[_FREE]), 0.0
+    if j >= 0:
+        slip, yields = _on_spring(
+            h, theta, system.tangential[j], 0.0, elongation(system, j, motion.q), motion.before[row],
+            motion.impulse[row], slip,
+        )  # fmt: skip
+    return slip, yields
 
 
 @inlined

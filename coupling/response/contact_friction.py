@@ -10,6 +10,7 @@ from vanedamp.coupling.response.records import DETACHES, FRICTION, IMPACT, KINDS
 from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.solver_options import METHODS
 from vanedamp.coupling.system.system import System
+from vanedamp.coupling.system.unit_laws import rubs
 
 #: table of the elements that are always listed
 JOINT = "joint"
@@ -36,13 +37,7 @@ class FrictionObserver(Observer):
 
     def begin(self, scene: Scene, system: System) -> Needs:
         """Return the log, and work by contact where the energy balance has that of several."""
-        return Needs(log=True, exponent=1.0 if np.sum(_rubs(system)) > 1 else None)
-
-
-def _rubs(system: System) -> np.ndarray:
-    """Return which units (u,) have friction."""
-    units = np.arange(len(system.rest))
-    return (units >= system.contacts) | (system.friction[: len(units)] > 0.0)
+        return Needs(log=True, exponent=1.0 if np.sum(rubs(system)) > 1 else None)
 
 
 def _fields(scene: Scene, run: Outcome, known: Fields) -> Fields:
@@ -55,21 +50,21 @@ FRICTION_BY_CONTACT = FrictionObserver(_fields)
 
 def contact_friction(run: Outcome, first: int) -> tuple[ContactFriction, ...]:
     """Return the friction of joints and of contacts with friction over a run's periods from `first` on."""
-    system, ledger, rubs = run.system, run.records.ledger[: run.periods + 1], _rubs(run.system)
+    system, ledger, rubbing = run.system, run.records.ledger[: run.periods + 1], rubs(run.system)
     log = np.concatenate(run.log) if run.log else np.zeros((0, 3))
     worn = run.records.worn[: run.periods]
-    work = worn if worn.shape[1] else np.diff(ledger[:, FRICTION])[:, None] * rubs
+    work = worn if worn.shape[1] else np.diff(ledger[:, FRICTION])[:, None] * rubbing
     least, window = _NO_WORK * np.abs(ledger).max(), np.array([first, run.periods]) * system.period
     found = []
     for row, place in enumerate(run.rows.places):
-        if not rubs[row] and place[1] != JOINT:
+        if not rubbing[row] and place[1] != JOINT:
             continue
         entries = log[log[:, 2] == row]
         # impacts on rigid contacts pass; those that close them come to rest
         lasting = entries[np.isfinite(run.rows.spring[row]) | (entries[:, 1] != IMPACT)]
         began = 0 if not len(lasting) else int(lasting[-1, 0] / system.period) + 1
         late = work[min(began, run.periods - 1) :, row].sum()
-        held = _STICK if rubs[row] and late <= least else _SLIP
+        held = _STICK if rubbing[row] and late <= least else _SLIP
         if not len(lasting) and (system.rest[row] > 0.0 or len(entries)):
             held = _OPEN
         energy = float(work[first:, row].mean())

@@ -43,11 +43,11 @@ def fitted(system: System, state: RestartState) -> RestartState:
     if np.any(moved != p):
         state = replace(state, displacement=frozen(system.scale * moved))
     state = _inside(system, state)
-    most = elongation_bounds(system, motion_of(system, state).q)
+    most = _elongation_bounds(system, motion_of(system, state).q)
     return replace(state, elongation=frozen(np.clip(state.elongation, -most, most)))
 
 
-def elongation_bounds(system: System, q: np.ndarray) -> np.ndarray:
+def _elongation_bounds(system: System, q: np.ndarray) -> np.ndarray:
     """Return the largest elongations (d,) of a state's springs before sliders, m, at coordinates q (N,)."""
     most, unit = np.zeros(system.elongations), system.sprung
     most[: system.dampers] = system.grip / system.casing_spring

@@ -92,8 +92,7 @@ def assemble(scene: Scene, basis: ModalBasis | None = None) -> System:
         frequency=omega * np.array(list(shares)), omega=omega, period=2 * np.pi / omega, moment=0.0, speed=0.0,
         delassus=(values(units["J"]) / values(mass)) @ values(units["J"]).T,
         restitution_at=law_address(scene.contact, values(units["restitution"])[: len(contacts)]),
-        in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, casing=casing["casing"],
-        grip=casing["grip"], casing_spring=casing["spring"], **excited, **placed, **units,
+        in_plane=scene.planar, two_phases=scene.contact.two_phases, holds=holds, **casing, **excited, **placed, **units,
     )  # fmt: skip
     return system if active() is not None else with_scales(system)
 
@@ -114,7 +113,7 @@ def _casing(scene: Scene, basis: ModalBasis, first: int) -> dict[str, Any]:
     sliders = sum(element.sliders for _, _, element in scene.elements)
     casing = zeros((len(rows), first + sliders + np.count_nonzero((grip > 0.0) & np.isfinite(spring))))
     casing[:, : len(basis.stiffness)] = array(rows).reshape(len(rows), len(basis.stiffness))
-    return {"casing": casing, "grip": grip, "spring": spring}
+    return {"casing": casing, "grip": grip, "casing_spring": spring}
 
 
 def _by_sector(scene: Scene, basis: ModalBasis) -> np.ndarray:

@@ -58,17 +58,6 @@ def matrices(system: System, motions: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return mass_of(system, motions), motions.T @ system.damping @ motions, motions.T @ system.stiffness @ motions
 
 
-def eased(system: System, units: np.ndarray, drag: np.ndarray) -> np.ndarray:
-    """Return the motions (m, N) of units' sliders (m,) as their bounds fall with the normal forces of contacts.
-
-    drag: (m,) friction per normal force, by the direction of slip.
-    """
-    contact = units < system.contacts
-    softness = np.where(contact, system.spring[units], 0.0) / system.tangential
-    rows: np.ndarray = (drag * softness)[:, None] * system.J[units]
-    return rows
-
-
 class StateFlow:
     """A system with units in their states (u,), in coordinates sqrt(M) q.
 
@@ -101,7 +90,7 @@ class StateFlow:
         self.holds, self.follows = np.flatnonzero(rests), np.flatnonzero(~rests)
         self.drawn = rows.copy()
         self.drawn[u + sprung] += system.elongation / root
-        self.drivers = self.drawn[u + sprung] + eased(system, sprung, self.drag[sprung]) / root
+        self.drivers = self.drawn[u + sprung] + (way[sprung] * system.ease)[:, None] * rows[sprung]
         self.kept, self.known = np.concatenate([self.closed, u + self.stick]), -(way * system.limit)[self.slides]
         self.wrench = wrenches(rows, self.closed, self.drag[self.closed], self.stick)
         self.push = wrenches(self.drawn, self.pressed, self.drag[self.pressed], self.stick[:0])

@@ -140,6 +140,13 @@ class System(NamedTuple):
         return np.flatnonzero(self.slider >= 0)
 
     @property
+    def ease(self) -> np.ndarray:
+        """How far sliders (j,) that slip move on, in their direction, as the gap of their contact opens by one."""
+        unit = self.sprung
+        springs = np.where(unit < self.contacts, self.spring[unit], 0.0)
+        return self.friction[unit] * springs / self.tangential
+
+    @property
     def elongations(self) -> int:
         """Number of elongations in a state: of friction dampers, 0 of rigid ones, then of contacts with sliders."""
         return self.dampers + int(np.count_nonzero(self.slider[: self.contacts] >= 0))

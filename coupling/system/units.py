@@ -287,11 +287,16 @@ def check_friction(contacts: list[Unit], mass: np.ndarray) -> None:
 
 
 def friction_elements(
-    bodies: list[Body], floor: np.ndarray, holds: np.ndarray, casing: np.ndarray, grip: np.ndarray, spring: np.ndarray
+    bodies: list[Body],
+    floor: np.ndarray,
+    holds: np.ndarray,
+    casing: np.ndarray,
+    grip: np.ndarray,
+    casing_spring: np.ndarray,
 ) -> Iterator[Unit]:
     """Yield the friction elements: floors under bodies that only slide, rigid friction dampers, those with springs.
 
-    floor (b, N), holds (b,), casing (d, N), grip, spring (d,): as in System. Elements without a limit do not count.
+    floor (b, N), holds (b,), casing (d, N), grip, casing_spring (d,): as in System. Those without a limit do not count.
     """
     none = zeros(floor.shape[1])
     for body in bodies:
@@ -299,9 +304,9 @@ def friction_elements(
             slip = -floor[body.number]
             slip[body.x] += 1.0
             yield Unit(none, slip, body=body.number, side="floor", limit=scalar(holds[body.number]))
-    for number in sorted(np.flatnonzero(grip > 0.0), key=lambda number: bool(spring[number] < np.inf)):
+    for number in sorted(np.flatnonzero(grip > 0.0), key=lambda number: bool(casing_spring[number] < np.inf)):
         yield Unit(
-            none, casing[number], body=int(number), limit=scalar(grip[number]), tangential=scalar(spring[number])
+            none, casing[number], body=int(number), limit=scalar(grip[number]), tangential=scalar(casing_spring[number])
         )
 
 

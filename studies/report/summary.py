@@ -109,9 +109,9 @@ def _answer(design: DesignCurves, count: int) -> list[str]:
     if not math.isfinite(headline.peak_ratio):
         return [f"{design.sentence}."]
     at = f"{format_value(headline.damped_peak_at)}{unit}"
-    damped, free, fixed, quiet = "", best.names.undamped, best.names.fixed, "Without impacts"
+    damped, free, fixed, onset = "", best.names.undamped, best.names.fixed, "Without impacts"
     if best.names == ReferenceNames():
-        damped, free, fixed, quiet = (
+        damped, free, fixed, onset = (
             "with the bodies ",
             "without them",
             "with the bodies fixed",
@@ -123,7 +123,6 @@ def _answer(design: DesignCurves, count: int) -> list[str]:
         f"{free} {1e6 * headline.undamped_peak:.4g} µm at {format_value(headline.undamped_peak_at)}{unit}: "
         f"{headline.peak_ratio:.1%} is left, at its largest {headline.maximum_ratio:.1%}"
     )
-    onset = quiet
     if headline.onset is not None:
         ok_x = best.x[np.isfinite(best.damped_mean)]
         first_point = ""

@@ -83,7 +83,7 @@ class Unforced:
         self.gap, self.speed = np.eye(self.extent)[self.d], np.eye(self.extent)[self.s]
         spring = np.where(self.soft, system.spring, 0.0)
         self.ease = np.zeros(u)
-        self.ease[self.sprung] = (system.friction * spring)[self.sprung] / system.tangential
+        self.ease[self.sprung] = system.ease
         self.push = -spring[:, None] * self.gap - system.dashpot[:, None] * self.speed[:u]
         self.extends = self.rigid & ~system.without_body  # whether a rigid contact is of a planar body
         self.extends[self.extends] = system.tilt[system.body[self.extends]] >= 0

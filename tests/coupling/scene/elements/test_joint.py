@@ -91,7 +91,11 @@ class Piecewise:
         if state == STICK:
             room = self.friction * self.push
             return [(self.push, "detach"), (room - self.drag, "slip"), (room + self.drag, "slip")]
-        return [(self.push, "detach"), (state * self.slip, "stick")]
+        return [(self.push, "detach"), (state * self.slider(state), "stick")]
+
+    def slider(self, state):
+        """The speed of what slips in a state."""
+        return self.slip
 
     def root(self, row, state, z, width):
         """Time at which a functional falls below zero, within a width."""

@@ -23,7 +23,7 @@ class Sprung(Piecewise):
         super().__init__(structure, joint, loads, frequency)
         self.stiffness = joint["tangential_stiffness"]
         self.gap, self.slip, self.push = (np.append(row, 0.0) for row in (self.gap, self.slip, self.push))
-        self.force = np.eye(12)[11]
+        self.drag = np.eye(12)[11]
 
     def force_rate(self, state):
         if state == OPEN:
@@ -35,11 +35,10 @@ class Sprung(Piecewise):
         return rate
 
     def slider(self, state):
-        """The slider's speed."""
         return self.slip - self.force_rate(state) / self.stiffness
 
     def generator(self, state):
-        forces = np.hstack([self.free, np.zeros((4, 1))]) - np.outer(self.along, self.force)
+        forces = np.hstack([self.free, np.zeros((4, 1))]) - np.outer(self.along, self.drag)
         if state != OPEN:
             forces += np.outer(self.across, self.push)
         turn = np.zeros((12, 12))
@@ -47,21 +46,13 @@ class Sprung(Piecewise):
         turn[4:8], turn[11] = self.inverse @ forces, self.force_rate(state)
         return turn
 
-    def guards(self, state):
-        if state == OPEN:
-            return [(self.gap, "impact")]
-        if state == STICK:
-            room = self.friction * self.push
-            return [(self.push, "detach"), (room - self.force, "slip"), (room + self.force, "slip")]
-        return [(self.push, "detach"), (state * self.slider(state), "stick")]
-
     def after(self, z, event):
         if event == "detach":
             z[11] = 0.0
             return OPEN
         if event == "stick":
             return STICK
-        way = np.sign((self.force if event == "slip" else self.slip) @ z)
+        way = np.sign((self.drag if event == "slip" else self.slip) @ z)
         return way if way * (self.slider(way) @ z) > 0.0 else STICK
 
     def start(self):
