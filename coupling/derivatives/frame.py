@@ -15,6 +15,7 @@ from vanedamp.coupling.scene.scene import Scene
 from vanedamp.coupling.scene.structures import Rom
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.coupling.system.flow import attached, matrices
+from vanedamp.coupling.system.linear_response import linear_response
 from vanedamp.coupling.system.modal_basis import transfer_of
 from vanedamp.coupling.system.resonance import steady_motion
 from vanedamp.coupling.system.system import SURFACES, System
@@ -106,40 +107,49 @@ class Frame:
         structure = (self._turn @ part for part in parts[:2])
         return RestartState(*map(frozen, (*structure, *parts[2:4], elongation, self.system.travels, *whole)))
 
-    def _glued(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return complex amplitudes (e, n) of the structure with all bodies at rest on their floors; its sag (n,).
+    def _glued(self) -> np.ndarray:
+        """Return complex amplitudes (e, n) of the structure with all bodies at rest on their floors, joints open.
 
         Amplitudes are inf at a resonance without damping.
         """
         system, e = self.system, len(self.system.frequency)
         lying = attached(system, np.ones(system.bodies, bool), across=True)
         mass, damping, stiffness = matrices(system, lying)
-        sag = np.linalg.solve(stiffness, system.weight @ lying)
         try:
-            return steady_motion(stiffness, damping, mass, system.load @ lying, system.frequency), sag
+            return steady_motion(stiffness, damping, mass, system.load @ lying, system.frequency)
         except np.linalg.LinAlgError:
-            return np.full((e, system.modes), np.inf + 0j), sag
+            return np.full((e, system.modes), np.inf + 0j)
 
     def linear_orbit(self) -> np.ndarray:
-        """Return the state (k,) of the motion without contact, where all bodies are at rest on their floors.
+        """Return the state (k,) of the motion without events: all bodies rest on their floors, and joints stick.
 
         Raises InputError at a resonance without damping.
         """
-        system, (amplitude, sag) = self.system, self._glued()
-        if not np.all(np.isfinite(amplitude)):
-            raise InputError("excitation.frequency: at a resonance without damping no motion repeats; change it")
+        system, stuck = self.system, linear_response(self.system, True, across=True)
+        frequency, closed = stuck.order * system.omega, (system.rest <= 0.0) & np.isfinite(system.spring)
+        closed &= system.without_body
+        pushes = system.weight - (system.spring[closed] * system.rest[closed]) @ system.J[: len(closed)][closed]
+        try:
+            amplitude = stuck.steady(stuck.load, frequency)
+            sag = stuck.steady(attached(system, np.ones(system.bodies, bool), across=True).T @ pushes, np.zeros(1))[0]
+        except np.linalg.LinAlgError:
+            raise InputError(
+                "excitation.frequency: at a resonance without damping no motion repeats; change it"
+            ) from None
+        moved, elongation = (amplitude.sum(axis=0) + sag).real, np.zeros(system.elongations)
+        elongation[system.drawn] = system.elongation[:, : system.modes] @ moved
         parts = {
-            "displacement": system.scale * (amplitude.sum(axis=0).real + sag),
-            "velocity": system.scale * ((1j * system.frequency) @ amplitude).real,
-            "slip": self.scene.positions,
-        }
+            "displacement": system.scale * moved,
+            "velocity": system.scale * ((1j * frequency) @ amplitude).real,
+            "slip": self.scene.positions, "elongation": elongation,
+        }  # fmt: skip
         still = self.restart_of(np.zeros(len(self.to_state)))
         return self.state_of(replace(still, **{name: frozen(part) for name, part in parts.items()}))
 
     def sizes(self) -> np.ndarray:
         """Return sizes (k,) of the coordinates: linear response, plays, tilts that take them, and these times omega."""
         system, omega = self.system, self.system.omega
-        reach = np.abs(system.scale) * np.abs(self._glued()[0]).sum(axis=0)
+        reach = np.abs(system.scale) * np.abs(self._glued()).sum(axis=0)
         cavity = [self.scene.cavity[index] for index in system.cavity]
         gap = np.array([each.gap for each in cavity])
         lift, tilt = np.ones((2, len(gap)))
@@ -150,7 +160,7 @@ class Frame:
         farthest = float(np.r_[gap, system.travels].max(initial=0.0))
         largest = reach.max(initial=0.0)
         largest = largest if 0.0 < largest < np.inf else farthest or 1.0
-        reach = np.where(np.isfinite(reach), np.maximum(reach, 1e-6 * largest), largest)
+        reach = np.where(np.isfinite(reach), np.maximum(reach, 1e-3 * largest), largest)
         of_extended = (lift, omega * lift, tilt, omega * tilt)
         return frozen(np.concatenate([
             reach, omega * reach, gap, omega * gap, *(part[self.extended] for part in of_extended), self.longest

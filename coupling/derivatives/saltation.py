@@ -51,6 +51,8 @@ from vanedamp.coupling.numerics.compiler.jit import counting, inlined, kernel
 #: largest difference of the engine's motion and the own flows', relative to a coordinate's size, and that size
 #: where it hardly moves, relative to its typical one
 _AGREEMENT, LEAST = 1e-8, 1e-4
+#: least size of a coordinate, times the largest: energies are squares of coordinates
+_LITTLE = 1e-4
 #: difference of a speed after an impact and its law's, relative to the fastest there
 _LAW = 1e-9
 #: speed that an engine has taken from a row by no impulse, relative to the fastest, beyond round-off
@@ -125,10 +127,10 @@ def agrees(room, eq, walk, predicted, actual):
         # slip and structure may cancel
         for s in range(len(sizes)):
             terms[i] += abs(eq.from_state[i, s]) * sizes[s]
-    same = True
+    same, least = True, _LITTLE * terms.max()
     for i in range(size):
-        # a coordinate and its rate have one size, since either may pass through zero
-        both = max(terms[i], terms[size + i])
+        # a coordinate and its rate have one size, since either may pass through zero; a wave may leave modes at rest
+        both = max(terms[i], terms[size + i], least)
         for at in (i, size + i):
             walk.size[at] = max(walk.size[at], both)
             if not (i >= size - sliders or abs(predicted[at] - actual[at]) <= _AGREEMENT * walk.size[at]):

@@ -26,7 +26,7 @@ def of_waves(period_map: PeriodMap) -> PeriodMap:
     """
     if period_map.travelling is None or period_map.periods != 1:
         raise InputError(
-            "orbit.wave: a wave travels over equal sectors with bodies in equal steps (cavities such as c@0, c@1), "
+            "orbit.wave: a wave travels over equal sectors with bodies or joints in equal steps (c@0, c@1, ...), "
             "without mistuning or scatter, under one engine order that is no multiple of their number; over one period"
         )
     return replace(period_map, wave=True, earlier=[])

@@ -39,7 +39,8 @@ class Orbit:
     periods: Annotated[Whole | None, Field(ge=1, le=64)] = None
     """periods of the excitation that the motion takes to repeat (default: those of the run; 1 with "linear")"""
     start: Literal["run", "linear"] = "run"
-    """what the orbit is sought from: "run", the end of a run of the scene; "linear", the motion without contact"""
+    """what the orbit is sought from: "run", the end of a run of the scene; "linear", the motion in
+    which bodies rest on their floors, and joints and friction dampers stick"""
     wave: bool = False
     """find the travelling wave of a tuned ring, in which each sector does the same one phase later"""
     parameter: str = "excitation.frequency"

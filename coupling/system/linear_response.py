@@ -256,9 +256,13 @@ def linear_responses(scene: Scene, system: System | None = None) -> tuple[Linear
     return linear_response(system, False), linear_response(system, True)
 
 
-def linear_response(system: System, fixed: bool) -> LinearResponse:
-    """Return the response without bodies and joints, or with bodies fixed and joints stuck, to the harmonics."""
-    motions, modes, order = attached(system, np.full(system.bodies, fixed)), system.of_structure, system.order
+def linear_response(system: System, fixed: bool, across: bool = False) -> LinearResponse:
+    """Return the response without bodies and joints, or with bodies fixed and joints stuck, to the harmonics.
+
+    across: whether fixed bodies follow their floors across the cavity and in its rotation, too.
+    """
+    modes, order = system.of_structure, system.order
+    motions = attached(system, np.full(system.bodies, fixed), across=across)
     moves = np.flatnonzero(system.load.any(axis=1) | (system.table != 0) | (order == order[-1]))
     response = LinearResponse(
         modes.stiffness, modes.damping, mass_of(system, motions), (system.load @ motions)[moves], modes.response,

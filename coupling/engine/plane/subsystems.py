@@ -20,7 +20,7 @@ from scipy.linalg import eig, null_space, orth
 
 from vanedamp.coupling.engine.coalescence import coalesce
 from vanedamp.coupling.engine.known import IllConditioned, Known, known_of
-from vanedamp.coupling.engine.plane.tolerances import APART, RANK, REFINED
+from vanedamp.coupling.engine.plane.tolerances import APART, RANK, REFINED, SPLIT
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
@@ -231,8 +231,24 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
 def _modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Eigenvalues (c,), vectors (2k, c) and their inverse (c, 2k) of eta'' + damping eta' + stiffness eta = 0.
 
-    Of complex pairs one is returned, twice in the inverse: real parts count.
+    Of complex pairs one is returned, twice in the inverse: real parts count. Where two modes are one, as in a tuned
+    ring all of whose joints slip, motions are means of two problems' with stiffnesses SPLIT above and below, up to the
+    square of that.
     """
+    try:
+        return _separate_modes(stiffness, damping)
+    except IllConditioned:
+        k = len(stiffness)
+        turn = SPLIT * np.random.default_rng(0).normal(size=(k, k)) / np.sqrt(k)
+        both = [_separate_modes(stiffness + way * stiffness @ turn, damping) for way in (1.0, -1.0)]
+        values, vectors, inverse = zip(*both, strict=True)
+        if sum(map(len, values)) > 2 * k:
+            raise
+        return np.concatenate(values), np.hstack(vectors), 0.5 * np.vstack(inverse)
+
+
+def _separate_modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return _modes of a problem no two of whose modes are one; raises IllConditioned for others."""
     k = len(stiffness)
     if not k:
         return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)

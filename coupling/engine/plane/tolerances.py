@@ -55,6 +55,8 @@ SLOWEST, FASTEST = 1e-6, 1e6
 STIFFEST = 1e4
 #: ratio of frequencies above which modes are refined by Newton's method, and its largest step, times a mode
 APART, REFINED = 30.0, 1e-6
+#: change of the stiffness, relative, by which modes that are one become two
+SPLIT = 1e-7
 
 # --- searches
 #: derivative of an event function, times its bound, below which its sign is unknown

@@ -5,13 +5,17 @@ import re
 import numpy as np
 import pytest
 from numba import njit
+from scipy.linalg import eigh
 
 import vanedamp as vd
 from tests.coupling.scene.elements.test_joint import JOINT, LOADS, OPEN, STICK, Matrices, Piecewise, matrices, scene
+from tests.tools.rings import LumpedDisk
 from tests.tools.tiers import cases
 from vanedamp.coupling.system.assembly import assemble
 from vanedamp.files.toml_input import InputError
+from vanedamp.rom.interface import InterfaceCoordinate
 from vanedamp.rom.reduced import ReducedModel
+from vanedamp.rom.ring.reduction import reduce_ring
 
 SPRINGS = {"normal_stiffness": 1e5, "tangential_stiffness": 3e4}
 
@@ -244,15 +248,18 @@ def test_rigid_joints_all_round_are_rejected(more):
 
 
 @njit
-def stepped(mass, stiffness, damping, rows, joint, load, periods, steps):
-    """Displacement of coordinate 1, 100 times per period, by own explicit steps; rows: across and along, by joint."""
+def stepped(mass, stiffness, damping, rows, joint, load, watched, periods, steps):
+    """Displacement of a row (n,), 100 times per period, by own explicit steps; rows: across and along, by joint.
+
+    mass (n,); load: complex amplitudes (n,).
+    """
     preload, across, along, friction, omega = joint
     h, kept = 2 * np.pi / omega / steps, []
     q, v, slider = np.zeros(len(mass)), np.zeros(len(mass)), np.zeros(len(rows))
     for step in range(periods * steps):
         if step % (steps // 100) == 0:
-            kept.append(q[1])
-        force = load * np.sin(omega * h * step) - stiffness @ q - damping @ v
+            kept.append(watched @ q)
+        force = (load * np.exp(1j * omega * h * step)).real - stiffness @ q - damping @ v
         for j in range(len(rows)):
             push, driver = max(preload - across * (rows[j, 0] @ q), 0.0), rows[j, 1] @ q
             bound = friction * push / along
@@ -299,7 +306,37 @@ def test_a_wedge_between_platforms_is_a_part_with_two_joints(load, frequency):
     assert response.status is vd.Status.OK
     assert abs(response.energy_residual) < 1e-10
     joint = (preload, *springs.values(), 0.3, 2 * np.pi * frequency)
-    force = 6.0 * (unit[1] - unit[4])
-    own = [stepped(mass, stiffness, damping, rows, joint, force, periods, steps) for steps in (10000, 40000)]
+    force = -6.0j * (unit[1] - unit[4])
+    own = [stepped(mass, stiffness, damping, rows, joint, force, unit[1], periods, steps) for steps in (10000, 40000)]
     errors = [np.abs(one - response.displacement[: 100 * periods]).max() / np.abs(one).max() for one in own]
     assert errors[1] < 0.5 * errors[0] < 1e-4
+
+
+def test_joints_of_a_tuned_ring_that_all_slip(tmp_path):
+    """As all slip, pairs of its modes are one: against own steps with springs along that are ever stiffer."""
+    disk, sectors, periods = LumpedDisk(6), 6, 3
+    points = [
+        InterfaceCoordinate(name, "tip", axis, "node") for name, axis in (("along", (0, 1, 0)), ("out", (1, 0, 0)))
+    ]
+    reduce_ring(disk.sector(), points, 15).save(tmp_path / "ring.h5")
+    made = vd.Scene(
+        structure={"model": "ring", "file": str(tmp_path / "ring.h5"), "modes": 18},
+        joint=[{"between": ["along", "along@+1"], "normal": ["out", "out@+1"], "friction": 0.3, "preload": 2.0,
+                "normal_stiffness": 1e6, "sectors": "all"}],
+        excitation={"frequency": 300.0, "force": 20.0, "at": "along", "wave": 1},
+        time={"periods": periods, "transient": 0},
+    )  # fmt: skip
+    response = vd.simulate(made, samples_per_period=100)
+    assert response.status is vd.Status.OK
+    assert abs(response.energy_residual) < 1e-10
+    stiffness, mass, place = disk.whole()
+    squares, shapes = eigh(stiffness, mass)
+    squares, along, out = squares[:18], place[:, 16] @ shapes[:, :18], place[:, 15] @ shapes[:, :18]
+    rows = np.stack([out - np.roll(out, -1, axis=0), along - np.roll(along, -1, axis=0)], axis=1)
+    load = -20.0j * np.exp(-2j * np.pi * np.arange(sectors) / sectors) @ along
+    damping, errors = np.diag(2 * 0.002 * np.sqrt(squares)), []
+    for spring in (1e7, 1e8, 1e9):
+        joint = (2.0, 1e6, spring, 0.3, 2 * np.pi * 300.0)
+        own = stepped(np.ones(18), np.diag(squares), damping, rows, joint, load, along[0], periods, 80000)
+        errors.append(np.abs(own - response.displacement[: 100 * periods]).max() / np.abs(own).max())
+    assert errors[2] < 0.4 * errors[1] < 0.16 * errors[0] < 0.004  # as the root of their flexibility
