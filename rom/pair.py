@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from vanedamp.modal.algebra import first_largest
 from vanedamp.modal.matrices import SystemMatrices, unit_direction
 from vanedamp.rom.interface import InterfaceCoordinate, InterfaceError
-from vanedamp.rom.reduced import ACROSS
+from vanedamp.rom.reduced import ACROSS, SIDEWAYS
 
 # sine of an angle of one degree: directions as people write them
 _SQUARE = 0.0175
@@ -32,6 +32,7 @@ def pair_motions(
     points: int | None = None,
     tolerance: float | None = None,
     turn: tuple[np.ndarray, np.ndarray] | None = None,
+    sideways: bool = False,
 ) -> list[InterfaceCoordinate]:
     """Return the motions of two sides that touch, along and across: "<label>_1", "<label>_1_across", "<label>_2" ...
 
@@ -44,6 +45,7 @@ def pair_motions(
                side's extent, or of single points round-off
     turn       of a ring: matrix (3, 3) and point (3,), m, of the axis, that turn the second side into the next sector,
                where it touches the first; its motions are in the axes of its own sector then
+    sideways   whether each side has a third motion, "<label>_1_sideways", along it at right angles to `along`
 
     Raises InterfaceError for sides apart, or that are one, and directions that are no normal and tangent;
     modal.matrices.MatricesError for an unknown patch.
@@ -60,7 +62,7 @@ def pair_motions(
             "expected 90"
         )
     slip = unit_direction(slip - (slip @ across) * across)
-    directions = [(slip, across), (slip @ matrix, across @ matrix)]
+    directions = [slip, across, np.cross(across, slip)][: 3 if sideways else 2]
     positions = [matrices.coordinates[patch.nodes] for patch in patches]
     there = [positions[0], point + (positions[1] - point) @ matrix.T]
     if turn is None and not np.setdiff1d(patches[0].nodes, patches[1].nodes).size:
@@ -77,30 +79,30 @@ def pair_motions(
                 f"{label}: the centroids of {sides[0]} and {sides[1]} are {apart:.3g} m apart; expected up to "
                 f"{most:.3g} m: name sides that touch, or give `tolerance`"
             )
-        return [*_motions(label, sides, directions, None)]
+        return [*_motions(label, sides, directions, matrix, None)]
     nodes = [patches[0].nodes, patches[1].nodes if turn is None else -1 - patches[1].nodes]  # of another sector
     pairs = _nearest(label, sides, there, nodes, most, points)
     chosen = _spread(positions[0][pairs[:, 0]], points)
     return [
         motion
         for number, (one, other) in enumerate(pairs[chosen], start=1)
-        for motion in _motions(f"{label}.{number}", sides, directions, (positions[0][one], positions[1][other]))
+        for motion in _motions(f"{label}.{number}", sides, directions, matrix, (positions[0][one], positions[1][other]))
     ]
 
 
 def _motions(
     label: str,
     sides: _Sides,
-    directions: Sequence[tuple[np.ndarray, np.ndarray]],
+    directions: Sequence[np.ndarray],
+    matrix: np.ndarray,
     nodes: tuple[np.ndarray, np.ndarray] | None,
 ) -> Iterator[InterfaceCoordinate]:
-    """Yield the four motions of a pair: means, or of the nodes at two positions."""
+    """Yield the motions of a pair, means or of nodes at two positions. matrix: (3, 3), to axes of the second side."""
     for number, side in enumerate(sides):
         kind, point = ("average", None) if nodes is None else ("node", tuple(nodes[number].tolist()))
-        for suffix, direction in zip(("", ACROSS), directions[number], strict=True):
-            yield InterfaceCoordinate(
-                f"{label}_{number + 1}{suffix}", side, tuple(direction.tolist()), kind, point=point
-            )
+        for suffix, direction in zip(("", ACROSS, SIDEWAYS), directions, strict=False):
+            own = direction @ matrix if number else direction
+            yield InterfaceCoordinate(f"{label}_{number + 1}{suffix}", side, tuple(own.tolist()), kind, point=point)
 
 
 def _across(

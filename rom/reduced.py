@@ -24,8 +24,8 @@ __all__ = ["ReducedModel", "ReducedModelError", "modal_damping"]
 
 #: suffixes to the label of a displacement along a cavity: transverse motion, rotation
 NORMAL, ROTATION = ".normal", ".rotation"
-#: and of the motion across of a side of a pair
-ACROSS = "_across"
+#: and of the motions across of a side of a pair, and along it at right angles to the first
+ACROSS, SIDEWAYS = "_across", "_sideways"
 
 #: natural frequencies that a model prints
 _SHOWN = 6

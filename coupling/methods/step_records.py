@@ -9,7 +9,7 @@ from vanedamp.coupling.numerics.compiler.jit import inlined, kernel
 from vanedamp.coupling.response.recorder import note_outputs, note_step, note_tilts, put_sample, record_section
 from vanedamp.coupling.response.records import CONTACT, EXCITATION, FRICTION, IMPACT, IMPACT_LOSS, VISCOUS
 from vanedamp.coupling.system.system import FLOOR, LEFT, RIGHT
-from vanedamp.coupling.system.unit_kinematics import elongation, gap, slider_bound
+from vanedamp.coupling.system.unit_kinematics import elongation, gap, is_second, slider_bound
 
 #: a motion above this, in m or m/s, has no physical meaning
 _BOUND = 1e30
@@ -211,7 +211,7 @@ def _follow_contacts(system, times, motion, records, log, k):
     for r in range(system.contacts):
         pushed, before = motion.impulse[r] > 0.0, motion.before[r]
         if pushed and motion.active[r] == 0:
-            if before < 0.0:
+            if before < 0.0 and not is_second(system, r):
                 motion.counters[IMPACTS] += 1
                 records.impacts[p] += 1
                 if system.surface[r] == LEFT or system.surface[r] == RIGHT:

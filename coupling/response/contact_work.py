@@ -40,7 +40,8 @@ def contact_name(damper: int, side: str, corner: int = -1) -> str:
     if side == "body":
         return f"bodies {damper} and {damper + 1}"
     owner = "friction damper" if side == "casing" else f"{side} of body" if meets_body(side) else side
-    return f"{owner} {damper}" + (f", corner {corner}" if corner >= 0 else "")
+    where = f", corner {corner}" if meets_body(side) else f", {('along', 'sideways')[corner]}"
+    return f"{owner} {damper}" + (where if corner >= 0 else "")
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class OfContact:
     side: str
     """what it meets"""
     corner: int
-    """corner of a body; -1: none"""
+    """corner of a body; of a joint with two directions along 0, sideways 1; -1: none"""
 
     @property
     def name(self) -> str:

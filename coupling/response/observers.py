@@ -93,5 +93,5 @@ def _friction(scene: Scene, run: Outcome, row: int) -> float:
     if side == "casing":
         return scene.friction_damper[number].friction
     if run.system.in_plane and row < run.system.contacts:
-        return float(run.system.friction[row])
+        return float(run.system.friction[row]) / run.rows.sharing(row)
     return scene.damper[number].friction if side == "floor" else 0.0

@@ -86,7 +86,8 @@ class Event:
     impulse: Annotated[float, NumberUnit("N s")]
     """impulse along the normal"""
     corner: int = -1
-    """corner of a body, from 0 (of a block 0 to 3) counterclockwise from the lower left one; -1: none"""
+    """corner of a body, from 0 (of a block 0 to 3) counterclockwise from the lower left one; of a joint with two
+    directions, whose contacts share its normal force, 0 along and 1 sideways; -1: none"""
     tangential_impulse: Annotated[float, NumberUnit("N s")] = 0.0
     """impulse of friction"""
     loss: Annotated[float, NumberUnit("J")] = 0.0

@@ -80,6 +80,15 @@ def is_closed(system, st, unit):
 
 
 @inlined
+def is_second(system, unit):
+    """Whether a contact shares the normal force of the one before: of a joint with two directions."""
+    second = unit > 0 and system.corner[unit] == 1
+    for i in range(len(system.mass)):
+        second = second and system.J[unit, i] == system.J[unit - 1, i]
+    return second
+
+
+@inlined
 def elongation(system, j, q):
     """Return the elongation of the spring before a slider, m; of velocities, its rate."""
     total = 0.0

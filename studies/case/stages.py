@@ -154,7 +154,9 @@ def _coordinates(case: Case, label: str, table: InterfaceTable, matrices: System
         first, second = table.groups
         across = None if table.normal is None else _direction(label, "normal", table.normal, table, matrices)
         turn = case.ring.turn(case.rotation) if case.ring is not None and table.next_sector else None
-        return pair_motions(matrices, label, (first, second), direction, across, table.points, table.tolerance, turn)
+        return pair_motions(
+            matrices, label, (first, second), direction, across, table.points, table.tolerance, turn, table.sideways
+        )
     if not table.planar:
         return [InterfaceCoordinate(label, table.facets, direction, table.kind, table.motion)]
     normal = table.normal

@@ -315,7 +315,8 @@ class InterfaceTable:
 
     Kind "patch" and "cavity" give three coordinates, of the motion in a plane, and "node" with a `normal` the first two
     of them (rom.interface.plane_motion). Kind "pair" gives four for a [[joint]] at two sides that touch: NAME_1,
-    NAME_1_across, NAME_2 and NAME_2_across (rom.pair.pair_motions).
+    NAME_1_across, NAME_2 and NAME_2_across, and with `sideways` NAME_1_sideways, NAME_2_sideways
+    (rom.pair.pair_motions).
     """
 
     facets: Annotated[str | Annotated[tuple[str, ...], Field(min_length=1)], BeforeValidator(_groups)]
@@ -338,6 +339,8 @@ class InterfaceTable:
     """largest distance of the two sides of a pair (default: a hundredth of the first one's extent) [m]"""
     next_sector: bool = False
     """whether the second side of a pair is that of the next sector of the ring"""
+    sideways: bool = False
+    """whether a pair has a second direction along, at right angles to `direction`"""
 
     def __post_init__(self) -> None:
         if self.paired:
@@ -347,7 +350,7 @@ class InterfaceTable:
                 key = "direction" if self.direction == "normal" else "motion"
                 raise ValueError(f'{key}: kind = "pair" slips along a direction in its plane; give three numbers')
             return
-        for key in ("points", "tolerance", "next_sector"):
+        for key in ("points", "tolerance", "next_sector", "sideways"):
             if getattr(self, key):
                 raise ValueError(f'{key}: is for kind = "pair"; leave it out')
         if self.kind in ("patch", "cavity") and self.motion == "rotation":

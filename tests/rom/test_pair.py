@@ -112,6 +112,23 @@ def test_mean_motions_are_those_of_the_own_side(built, sizes):
     assert made.vectors.T @ moved.ravel() == pytest.approx(expected, abs=1e-12)
 
 
+def test_sideways_is_at_right_angles(built):
+    """A third motion of each side; `sideways = true` of the joint takes it."""
+    structure = built(CASE + "sideways = true\n")
+    made = interface(structure.case, structure.matrices, ["platform"])
+    moved = structure.matrices.coordinates @ np.diag([1.0, 2.0, 3.0]) + [0.0, 0.0, 1.0]
+    values = dict(zip(made.labels, made.vectors.T @ moved.ravel(), strict=True))
+    assert len(values) == 6 and values["platform_1_sideways"] == pytest.approx(values["platform_2_sideways"])
+    assert abs(values["platform_1_sideways"]) == pytest.approx(3.0 * 0.5 + 1.0)  # along z
+    given = {"friction": 0.3, "preload": 1.0, "normal_stiffness": 1e6}
+    assert Joint(at="platform", sideways=True, **given) == Joint(
+        between=("platform_1", "platform_2"), normal=("platform_1_across", "platform_2_across"),
+        sideways=("platform_1_sideways", "platform_2_sideways"), **given,
+    )  # fmt: skip
+    ring = Joint(at="platform@+1", sideways=True, **given)
+    assert ring.sideways == ("platform_1_sideways", "platform_2_sideways@+1")
+
+
 @pytest.mark.parametrize("points", [1, 4, 9])
 def test_pairs_of_nodes_lie_on_each_other_all_over_the_face(built, points):
     structure = built(CASE + f"points = {points}\n", (0.25, 0.25))
@@ -289,6 +306,7 @@ PAIR = {"kind": "pair", "facets": ["lower", "upper"], "direction": [0, 1, 0]}
         ({"points": 500}, "points = 500 needs as many"),
         ({"next_sector": True}, "interface.platform.next_sector: needs [ring]"),
         ({"kind": "average", "points": 3}, 'points: is for kind = "pair"'),
+        ({"kind": "average", "sideways": True}, 'sideways: is for kind = "pair"'),
     ],
 )
 def test_bad_pairs_are_named(built, table, error):

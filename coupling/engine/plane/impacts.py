@@ -39,6 +39,7 @@ from vanedamp.coupling.system.unit_kinematics import (
     is_closed,
     is_compliant,
     is_rigid,
+    is_second,
     row_speed,
     speed_scale,
 )
@@ -213,14 +214,15 @@ def _apply(system, st, rec, scratch, count, tiny):
 def log_impact(system, st, rec, r, before, after, normal, tangential, loss):
     """Count an impact and log it: relative velocities, normal and tangential impulse, the energy that they take."""
     st.last_impact[r] = st.time[0]
-    st.counters[IMPACTS] += 1
-    rec.impacts[st.counters[PERIOD]] += 1
     energy = 0.5 * before * before / system.delassus[r, r]
-    rec.collided[st.counters[PERIOD]] += energy
+    if not is_second(system, r):
+        st.counters[IMPACTS] += 1
+        rec.impacts[st.counters[PERIOD]] += 1
+        rec.collided[st.counters[PERIOD]] += energy
+        if rec.struck.shape[1] > 0:
+            note_impact(rec, st.counters[PERIOD], r, energy)
     if system.surface[r] == LEFT or system.surface[r] == RIGHT:
         rec.walls[st.counters[PERIOD], system.body[r]] += 1
-    if rec.struck.shape[1] > 0:
-        note_impact(rec, st.counters[PERIOD], r, energy)
     log_event(system, st, rec, IMPACT, r, before, after, normal, tangential, loss)
 
 

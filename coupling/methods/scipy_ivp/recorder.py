@@ -191,11 +191,13 @@ class Recorder:
                 self._count(t, r, speed[r], after[r], *impulses, losses[r] + losses[u + r])
 
     def _count(self, t: float, r: int, before: float, after: float, *others: float) -> list[float]:
-        self.impacts += 1
-        self.records.impacts[self.period] += 1
+        # not twice at a joint with two directions, whose contacts have one normal row
+        if self.system.corner[r] < 1 or (self.system.J[r] != self.system.J[r - 1]).any():
+            self.impacts += 1
+            self.records.impacts[self.period] += 1
+            self.records.collided[self.period] += 0.5 * before**2 / self.system.delassus[r, r]
         if self.system.surface[r] in (LEFT, RIGHT):
             self.records.walls[self.period, self.system.body[r]] += 1
-        self.records.collided[self.period] += 0.5 * before**2 / self.system.delassus[r, r]
         entry = [self.period * self.system.period + t, IMPACT, self.first + r, before, after, *others]
         entry = entry[: WIDTH if self.plane else LINE_WIDTH]
         if self.keep:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -46,6 +46,10 @@ class Joint(SceneElement):
     """constant load that closes the joint; at rest the normal force balances it [N]"""
     preload_by_speed: NonNegative = 0.0
     """what the speed of rotation adds to it: preload + preload_by_speed speed^2 [N s^2]"""
+    sideways: _Points | Literal[True] | None = None
+    """labels of the motions of the same points along the joint at right angles to between, or true for those of a pair
+    (default: none); needs normal_stiffness or residual. Friction of both directions has its own limit, friction times
+    the normal force (a box)"""
     gap: NonNegative = 0.0
     """distance across the joint at rest; not with a preload [m]"""
     normal_stiffness: Positive | None = None
@@ -64,24 +68,31 @@ class Joint(SceneElement):
         if self.at is not None:
             if self.between is not _MISSING or self.normal is not _MISSING:
                 raise ValueError("at: a pair has both of between and normal; leave them out")
+            if isinstance(self.sideways, tuple):
+                raise ValueError("sideways: a pair has its own labels; give true")
             name, mark, where = self.at.partition("@")
             sectors = "" if where[:1] in ("+", "-") else mark + where, mark + where
             first, second = (f"{name}_{number}" for number in (1, 2))
-            object.__setattr__(self, "between", (first + sectors[0], second + sectors[1]))
-            object.__setattr__(self, "normal", (f"{first}_across{sectors[0]}", f"{second}_across{sectors[1]}"))
+            for key, of in (("between", ""), ("normal", "_across"), ("sideways", "_sideways")):
+                if key != "sideways" or self.sideways:
+                    object.__setattr__(self, key, (f"{first}{of}{sectors[0]}", f"{second}{of}{sectors[1]}"))
             object.__setattr__(self, "at", None)  # as if written out
         for key, points in (("between", self.between), ("normal", self.normal)):
             if points is _MISSING:
                 raise ValueError(f"{key}: missing; name two points, or give `at`, a pair of the case")
-        for key, points in (("between", self.between), ("normal", self.normal)):
+        if self.sideways is True:
+            raise ValueError("sideways: true is of a pair, `at`; name two points")
+        for key, points in self._points.items():
             if points[0] == points[1]:
                 raise ValueError(f"{key}: '{points[0]}' does not rub on itself; name another point, or \"{_CASING}\"")
-        if [one == _CASING for one in self.between] != [one == _CASING for one in self.normal]:
-            raise ValueError(f'normal: expected "{_CASING}" in the same place as in between')
+            if [one == _CASING for one in self.between] != [one == _CASING for one in points]:
+                raise ValueError(f'{key}: expected "{_CASING}" in the same place as in between')
         if self.gap and (self.preload or self.preload_by_speed):
             raise ValueError("gap: a joint that is open at rest has no preload; give one of them")
         if self.tangential_stiffness is not None and not self.yields:
             raise ValueError("tangential_stiffness: needs normal_stiffness, of the same part; give both")
+        if self.sideways and not self.yields:
+            raise ValueError("sideways: needs normal_stiffness or residual: rigid, its normal force has no share")
 
     @property
     def yields(self) -> bool:  # type: ignore[override]
@@ -91,13 +102,19 @@ class Joint(SceneElement):
     @property
     def sliders(self) -> int:
         """Number of its units that have a spring along."""
-        return int(self.tangential_stiffness is not None or self.residual)
+        return (len(self._points) - 1) * (self.tangential_stiffness is not None or self.residual)
+
+    @property
+    def _points(self) -> dict[str, _Points]:
+        """Its points, by key."""
+        given: dict[str, Any] = {"between": self.between, "normal": self.normal, "sideways": self.sideways}
+        return {key: points for key, points in given.items() if points}
 
     def labels(self) -> Mapping[str, str | None]:
         """Return the labels of its points, by key and place."""
         return {
             f"{key}[{place}]": label
-            for key, points in (("between", self.between), ("normal", self.normal))
+            for key, points in self._points.items()
             for place, label in enumerate(points)
             if label != _CASING
         }
@@ -106,10 +123,11 @@ class Joint(SceneElement):
         """Return it with other labels, by key and label."""
 
         def turned(key: str) -> _Points:
-            first, last = (one if one == _CASING else label(key, one) for one in getattr(self, key))
+            first, last = (one if one == _CASING else label(key, one) for one in self._points[key])
             return first, last
 
-        return replace(self, between=turned("between"), normal=turned("normal"))
+        moved: dict[str, Any] = {key: turned(key) for key in self._points}
+        return replace(self, **moved)
 
     def check(self, scene: Any) -> None:
         """Raise ValueError for what the contact law does not take."""
@@ -123,11 +141,10 @@ class Joint(SceneElement):
             raise ValueError("preload: springs in parallel begin one after the other; give normal_stiffness")
 
     def units(self, number: int, parts: Parts) -> Iterator[Unit]:
-        """Yield its contact."""
+        """Yield its contact; of two directions along one each, which share its normal force: half, with twice mu."""
 
         def shares(key: str) -> dict[str, float]:
-            points: _Points = getattr(self, key)
-            return {label: sign for label, sign in zip(points, (1.0, -1.0), strict=True) if label != _CASING}
+            return {label: sign for label, sign in zip(self._points[key], (1.0, -1.0), strict=True) if label != _CASING}
 
         def apart(key: str) -> np.ndarray:
             motions = [sign * parts.motion(label, f"joint[{number}].{key}") for label, sign in shares(key).items()]
@@ -145,13 +162,16 @@ class Joint(SceneElement):
                 )
             return 1.0 / yields
 
-        normal, slip, load = apart("normal"), apart("between"), self.preload + self.preload_by_speed * parts.speed**2
+        along = [key for key in ("between", "sideways") if key in self._points]
+        normal, share = apart("normal"), len(along)
+        load = (self.preload + self.preload_by_speed * parts.speed**2) / share
         if self.yields:
-            element = Element(0.0, stiffness("normal", self.normal_stiffness))
+            element = Element(0.0, stiffness("normal", self.normal_stiffness) / share)
         else:
             element = parts.contact(normal, self.restitution, *shares("normal"))
-        tangential = stiffness("between", self.tangential_stiffness) if self.sliders else np.inf
-        yield Unit(
-            normal, slip, self.gap - load / element.stiffness, self.friction, element, 0.0, number, closing=load,
-            tangential=tangential,
-        )  # fmt: skip
+        for direction, key in enumerate(along):
+            tangential = stiffness(key, self.tangential_stiffness) if self.sliders else np.inf
+            yield Unit(
+                normal, apart(key), self.gap - load / element.stiffness, share * self.friction, element, 0.0, number,
+                corner=direction if share > 1 else -1, closing=load, tangential=tangential,
+            )  # fmt: skip
