@@ -15,7 +15,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import null_space
 
 from vanedamp.coupling.numerics.codes import OPEN, STICK
 from vanedamp.coupling.system.system import System
@@ -56,6 +55,19 @@ def mass_of(system: System, motions: np.ndarray) -> np.ndarray:
 def matrices(system: System, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return mass, damping and stiffness (k, k) of a system that has motions (N, k) only, without sliders' springs."""
     return mass_of(system, motions), motions.T @ system.damping @ motions, motions.T @ system.stiffness @ motions
+
+
+def times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Return matrix (n, m) @ columns (m, c), where only the latter may be complex."""
+    if columns.dtype != complex:
+        return np.asarray(matrix @ columns)
+    return np.asarray(matrix @ np.ascontiguousarray(columns).view(float)).view(complex)
+
+
+def null_space(matrix: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis (n, k) of what a matrix (m, n) makes zero."""
+    _, size, turned = np.linalg.svd(matrix, full_matrices=len(matrix) < matrix.shape[1])
+    return np.asarray(turned[np.count_nonzero(size > SINGULAR * size.max(initial=0.0)) :].T)
 
 
 class StateFlow:
@@ -113,6 +125,13 @@ class StateFlow:
         return (self.state == STICK) & self.rubs
 
     @cached_property
+    def follow(self) -> np.ndarray:
+        """Motions of sliders (j, N) by those of their drivers."""
+        follow, massive = np.zeros_like(self.drivers), len(self.root) - self.sliders
+        follow[self.follows, :massive] = (self.root[massive:, None] * self.drivers[:, :massive])[self.follows]
+        return follow
+
+    @cached_property
     def inverse(self) -> np.ndarray:
         """Motions (N, k) that move one of the kept rows each, the least."""
         return np.asarray(np.linalg.pinv(self.rows[self.kept], rcond=SINGULAR))
@@ -124,7 +143,7 @@ class StateFlow:
         scale = 1 / np.linalg.norm(rows, axis=1)
         # on the rows' span: the mobility of rows that nearly depend on each other has the square of their condition
         felt = self.inverse @ rows @ self.wrench * scale
-        return scale[:, None] * null_space(felt, rcond=SINGULAR) if len(rows) else np.zeros((0, 0))
+        return scale[:, None] * null_space(felt) if len(rows) else np.zeros((0, 0))
 
     @cached_property
     def held(self) -> np.ndarray:
@@ -145,10 +164,9 @@ class StateFlow:
 
     def followed(self, motion: np.ndarray) -> np.ndarray:
         """Return motions (N, ...) with sliders as they are: at rest, or as their drivers."""
-        size, moved = len(self.root), motion.copy()
-        moved[size - self.sliders :] = 0.0
-        for a, row in zip(size - self.sliders + self.follows, self.drivers[self.follows], strict=True):
-            moved[a] = self.root[a] * (row[: -self.sliders] @ motion[: -self.sliders])
+        moved = motion.copy()
+        if self.sliders:
+            moved[-self.sliders :] = times(self.follow, motion)
         return moved
 
     def settled(self, motion: np.ndarray, terms: np.ndarray) -> np.ndarray:
@@ -219,8 +237,8 @@ def _forces_of_near_dependent(
     returned.
     """
     wrench = wrench * scale
-    free = null_space(rows * scale[:, None], rcond=SINGULAR)
-    normal = null_space(wrench.T, rcond=SINGULAR)
+    free = null_space(rows * scale[:, None])
+    normal = null_space(wrench.T)
     meeting = normal.T @ free  # cosines
     if free.shape != normal.shape or np.linalg.svd(meeting, compute_uv=False).min(initial=1.0) < SINGULAR:
         return carried, oblique

@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import eig, null_space, orth
 
 from vanedamp.coupling.engine.coalescence import coalesce
 from vanedamp.coupling.engine.known import IllConditioned, Known, known_of
@@ -24,7 +23,7 @@ from vanedamp.coupling.engine.plane.tolerances import APART, RANK, REFINED, SPLI
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, DEFECTIVE, LOST
-from vanedamp.coupling.system.flow import HELD_ROUND_OFF, StateFlow
+from vanedamp.coupling.system.flow import HELD_ROUND_OFF, StateFlow, null_space, times
 from vanedamp.coupling.system.system import System
 from vanedamp.coupling.system.unit_laws import SINGULAR
 
@@ -121,22 +120,21 @@ def _same(stack: PlanarSubsystems, system: System, state: np.ndarray) -> np.ndar
 def _stretched(system: System, springs: np.ndarray) -> np.ndarray:
     """Basis B (k, N) of the rows of stiffness and damping, in coordinates sqrt(M) q, and of springs (s, N).
 
-    A slider that a spring pulls is a direction of its own: it rests, whatever its driver does.
+    Sliders, which rest or follow, are not in it.
     """
     root, massive = np.sqrt(system.mass), len(system.mass) - len(system.tangential)
     matrix = system.stiffness / root / root[:, None]
     size = np.sqrt(np.abs(np.diag(matrix)).max(initial=0.0))
     rows = springs / root
     rows *= (size**2 or 1.0) / np.linalg.norm(rows, axis=1)[:, None]
-    both = np.vstack([matrix, size * system.damping / root / root[:, None], rows])
-    unit, touched = np.eye(len(root)), np.flatnonzero(both.any(axis=0))
-    moving = touched[touched < massive]
-    if len(moving) <= 1 or np.linalg.matrix_rank(both[:, moving]) == len(moving):
-        return unit[touched]
-    basis: np.ndarray = np.vstack(
-        [orth((both @ unit[:massive].T).T, rcond=RANK).T @ unit[:massive], unit[touched[touched >= massive]]]
-    )
-    return basis
+    both = np.concatenate([matrix, size * system.damping / root / root[:, None], rows])[:, :massive]
+    moving, round_off = np.flatnonzero(both.any(axis=0)), len(both) * np.finfo(float).eps
+    unit, block = np.eye(massive, len(root))[moving], matrix[np.ix_(moving, moving)]
+    least = np.diag(block).min(initial=np.inf)
+    if len(moving) <= 1 or (np.count_nonzero(block) == len(moving) and least > round_off * np.linalg.norm(both)):
+        return unit  # as for a diagonal stiffness
+    _, size, turned = np.linalg.svd(both[:, moving], full_matrices=False)
+    return unit if size[-1] > round_off * size[0] else np.asarray(turned[size > RANK * size[0]] @ unit)
 
 
 def _projectors(flow: StateFlow) -> dict[str, Any]:
@@ -146,7 +144,7 @@ def _projectors(flow: StateFlow) -> dict[str, Any]:
     stop_rows = np.zeros((len(root), 2 * u))
     if len(kept) > 1:  # a single force balances none
         lever = np.linalg.norm(flow.wrench, axis=0)
-        balanced = null_space(flow.wrench / lever, rcond=SINGULAR)
+        balanced = null_space(flow.wrench / lever)
         self_stress[:, kept] = flow.spread(balanced @ balanced.T / lever[:, None] * lever)
     stopped = np.concatenate([touching, u + flow.stick])
     if len(stopped):
@@ -162,67 +160,82 @@ def _projectors(flow: StateFlow) -> dict[str, Any]:
 def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
     """Return the fields of the subsystem of the states (u,), of as many modes as there are."""
     size, sliders = len(system.mass), len(system.tangential)
-    flow = StateFlow(system, state)
+    massive, flow = size - sliders, StateFlow(system, state)
     if flow.left > LOST:
         raise IllConditioned("its friction forces have no solution")
     root, pressed, push, holds = flow.root, flow.pressed, flow.push, flow.holds
     stiffness, damping, oblique, preload = flow.stiffness, flow.damping, flow.oblique, flow.preload
-    constraints = flow.rows[flow.kept]
-    mobility = ((system.elongation[holds] / root)[:, : size - sliders] ** 2).sum(axis=1)
-    basis = _stretched(system, np.vstack([system.J[pressed], system.elongation[holds]]))
-    allowed = np.eye(len(basis))
+    mobility = ((system.elongation[holds] / root)[:, :massive] ** 2).sum(axis=1)
+    inner = basis = _stretched(system, np.concatenate([system.J[pressed], system.elongation[holds]]))
+    constraints, held = flow.rows[flow.kept, :massive], np.zeros((size, size))
+    constraints = constraints[constraints.any(axis=1)]  # others are those of sliders
     if len(basis) and len(constraints):
         # both are orthonormal: singular values are sines, and constrained directions have none above round-off
-        turned, sine, _ = np.linalg.svd(basis @ null_space(constraints, rcond=SINGULAR), full_matrices=False)
-        allowed = turned[:, sine > SINGULAR]
-    k = allowed.shape[1]
-    held = basis.T @ basis - basis.T @ allowed @ allowed.T @ basis if k < len(basis) else np.zeros((size, size))
-    held[np.abs(held) < HELD_ROUND_OFF] = 0.0
-    inner = allowed.T @ basis  # eta = inner sqrt(M) q
-    inner[:, size - sliders :] = 0.0  # sliders rest, or follow
-    own, loss = (inner @ oblique @ matrix @ inner.T for matrix in (stiffness, damping))
+        allowed = null_space(constraints)
+        turned, sine = allowed.T, np.ones(allowed.shape[1])
+        if len(basis) < massive:
+            turned, sine, _ = np.linalg.svd(basis[:, :massive] @ allowed, full_matrices=False)
+            turned = turned.T @ basis[:, :massive]
+        inner = np.pad(turned[sine > SINGULAR], ((0, 0), (0, sliders)))
+        if len(inner) < len(basis):
+            held = basis.T @ basis - inner.T @ inner
+            held[np.abs(held) < HELD_ROUND_OFF] = 0.0
+    k = len(inner)  # eta = inner sqrt(M) q
+    held[massive + holds, massive + holds] = 1.0
+    fixed = np.flatnonzero(held.any(axis=0))
+    pushed, elastic, viscous = inner @ oblique, stiffness @ inner.T, damping @ inner.T
+    spring, dashpot = flow.spring @ inner.T, flow.dashpot @ inner.T
+    own, loss = pushed @ elastic, pushed @ viscous
     eigenvalue, shape, project = _modes(own, loss)
     order = np.argsort(np.abs(eigenvalue), kind="stable")
     rate, shape, project = eigenvalue[order], shape[:, order], project[order]
-    # constant part, of loads and of displacements that constraints hold
-    still = np.linalg.solve(own, inner @ oblique) if k else np.zeros((0, size))
-    weight = flow.weight
-    rest, rest_held = still @ weight, -still @ stiffness @ held
-    if len(pressed):  # a solution of its own: by the inverse, the large preload would leave its round-off
-        rest = rest - np.linalg.solve(own, inner @ oblique @ push @ preload)
-        weight = weight - push @ preload
+    # constant part, of loads and of displacements that constraints hold; that of a preload is a solution of its own: by
+    # the inverse, a large one would leave its round-off
+    still = np.linalg.solve(own, np.column_stack([pushed, pushed @ (push @ preload)]))
+    rest, still = still[:, :-1] @ flow.weight - still[:, -1], still[:, :-1]
+    weight, rest_held = flow.weight - push @ preload, -still @ (stiffness @ held[:, fixed])
+    displaced = held[:, fixed] + inner.T @ rest_held
     eta, springs = shape[:k], len(pressed) > 0 or len(holds) > 0
-    net = -(stiffness @ inner.T @ eta + damping @ inner.T @ (eta * rate))
-    net_constant, net_held = weight - stiffness @ inner.T @ rest, -stiffness @ (held + inner.T @ rest_held)
-    motion = (oblique @ net) / rate**2
-    bend, bend_held = oblique @ net_constant, oblique @ net_held
+    turn = eta * rate
+    net, net_constant, net_held = (
+        -times(elastic, eta) - times(viscous, turn),
+        weight - elastic @ rest,
+        -stiffness @ displaced,
+    )
+    motion, bend, bend_held = times(oblique, net) / rate**2, oblique @ net_constant, oblique @ net_held
     if springs:  # forces of stiff springs nearly cancel: their stretches are more accurate
-        motion += inner.T @ (eta - inner @ motion)
-        bend, bend_held = bend - inner.T @ inner @ bend, bend_held - inner.T @ inner @ bend_held
+        motion += times(inner.T, eta - times(inner, motion))
+        bend, bend_held = bend - inner.T @ (inner @ bend), bend_held - inner.T @ (inner @ bend_held)
     motion = flow.settled(motion, net / rate**2) / root[:, None]
     bend, bend_held = flow.followed(bend), flow.followed(bend_held)
-    both = np.hstack([inner * root, np.zeros_like(inner)]), np.hstack([np.zeros_like(inner), inner * root])
-    free = project @ np.vstack(both)
-    free[:, :size] -= project[:, :k] @ rest_held * root
-    turned, terms = system.J @ motion, np.abs(system.J) @ np.abs(motion)
-    force_constant = flow.spread(flow.carried @ net_constant, -preload - flow.spring @ inner.T @ rest)
+    both = (times((inner * root).T, part.T).T for part in (project[:, :k], project[:, k:]))
+    free = np.concatenate([*both], axis=1)
+    free[:, fixed] -= times(rest_held.T, project[:, :k].T).T * root[fixed]
+    turned, terms = times(system.J, motion), np.abs(system.J) @ np.abs(motion)
+    force_constant = flow.spread(flow.carried @ net_constant, -preload - spring @ rest)
     force_constant[flow.u + flow.slides] = flow.known
-    none, strained = np.zeros((len(flow.kept), k)), inner.T @ eta
+    none = np.zeros((len(flow.kept), k))
+
+    def by_held(parts: np.ndarray) -> np.ndarray:
+        whole = np.zeros((len(parts), size))
+        whole[:, fixed] = parts * root[fixed]
+        return whole
+
     slips = (state == SLIP_LEFT) | (state == SLIP_RIGHT)
     pushes = np.isfinite(system.spring) & (state < OPEN)
     return {
         "state": state, "slips": slips, "friction": system.friction, "limit": system.limit, "pressed": pushes,
-        "rest": system.rest, "stretches": k, "own": own, "loss": loss, "inner": inner, "pushed": inner @ oblique,
-        "elastic": stiffness @ inner.T, "viscous": damping @ inner.T, "springs": springs,
+        "rest": system.rest, "stretches": k, "own": own, "loss": loss, "inner": inner, "pushed": pushed,
+        "elastic": elastic, "viscous": viscous, "springs": springs,
         "slide": np.sqrt((system.tangential[holds] * mobility).max(initial=0.0)),
-        "oblique": oblique, "follow": flow.followed(np.eye(size))[size - sliders :],
-        "carry": flow.spread(flow.carried), "spring": flow.spread(none, -flow.spring @ inner.T),
-        "dashpot": flow.spread(none, -flow.dashpot @ inner.T),
-        "bend": bend / root, "bend_held": bend_held / root[:, None] * root, "force_constant": force_constant,
-        "force_held": flow.spread(flow.carried @ net_held * root, -flow.spring @ (held + inner.T @ rest_held) * root),
+        "oblique": oblique, "follow": flow.follow,
+        "carry": flow.spread(flow.carried), "spring": flow.spread(none, -spring),
+        "dashpot": flow.spread(none, -dashpot),
+        "bend": bend / root, "bend_held": by_held(bend_held / root[:, None]), "force_constant": force_constant,
+        "force_held": by_held(flow.spread(flow.carried @ net_held, -flow.spring @ displaced)),
         "modes": len(rate), "eigenvalue": rate, "motion": motion,
         "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
-        "force": flow.spread(flow.carried @ net, -flow.spring @ strained - flow.dashpot @ (strained * rate)),
+        "force": flow.spread(times(flow.carried, net), -times(spring, eta) - times(dashpot, turn)),
         "project": free, "offset": project[:, :k] @ rest, "split": project,
         "coalescing": coalesce(rate, shape, project),
     } | _projectors(flow)  # fmt: skip
@@ -253,21 +266,38 @@ def _separate_modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndar
     if not k:
         return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
     scale = np.sqrt(np.abs(stiffness).max())
-    matrix = np.block([[np.zeros((k, k)), np.eye(k) * scale], [-stiffness / scale, -damping]])
-    values, vectors = eig(matrix)
-    vectors /= np.linalg.norm(vectors, axis=0)
-    if not np.abs(values).min() > 0.0 or np.linalg.cond(vectors) > DEFECTIVE:
-        raise IllConditioned("its modes are one to round-off, or it has no stiffness")
+    matrix = np.zeros((2 * k, 2 * k))
+    matrix[:k, k:], matrix[k:, :k], matrix[k:, k:] = np.eye(k) * scale, -stiffness / scale, -damping
+    values, vectors = np.linalg.eig(matrix)
+    kept = values.imag >= 0.0
+    values, vectors = values[kept] + 0j, vectors[:, kept] + 0j
+    if not np.abs(values).min() > 0.0:
+        raise IllConditioned("it has no stiffness")
+    inverse = _inverse(vectors, values.imag > 0.0)
     if np.abs(values).max() > APART * np.abs(values).min():
         values, shapes = _polish(values, vectors[:k], stiffness, damping)
-        vectors = np.vstack([shapes, shapes * values / scale])
-        vectors /= np.linalg.norm(vectors, axis=0)
-    inverse = np.linalg.inv(vectors)
+        vectors = np.concatenate([shapes, shapes * values / scale])
+        inverse = _inverse(vectors, values.imag > 0.0)
     vectors[k:] *= scale
     inverse[:, k:] /= scale
-    keep = values.imag >= 0.0
-    inverse[values.imag > 0.0] *= 2.0
-    return values[keep], vectors[:, keep], inverse[keep]
+    return values, vectors, inverse
+
+
+def _inverse(vectors: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return the inverse (c, 2k) of vectors (2k, c), whose lengths it sets to one; of `pairs` one is given.
+
+    A unitary matrix makes real and imaginary parts, times sqrt(2), of a pair: the condition stays.
+    """
+    vectors /= np.linalg.norm(vectors, axis=0)
+    factor = np.where(pairs, np.sqrt(2.0), 1.0)
+    both = np.concatenate([vectors.real * factor, (vectors.imag * factor)[:, pairs]], axis=1)
+    solved = np.linalg.inv(both)
+    # the first is larger, and at hand
+    if not np.linalg.norm(both) * np.linalg.norm(solved) <= DEFECTIVE and np.linalg.cond(both) > DEFECTIVE:
+        raise IllConditioned("its modes are one to round-off")
+    inverse = solved[: len(pairs)] + 0j
+    inverse[pairs] -= 1j * solved[len(pairs) :]
+    return np.asarray(inverse * factor[:, None])
 
 
 def _polish(
