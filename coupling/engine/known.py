@@ -31,20 +31,23 @@ class IllConditioned(ArithmeticError):
 def with_free_place(stack: Any, filled: np.ndarray, empty: Callable[[int], Any], used: np.ndarray) -> tuple[Any, int]:
     """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
 
-    A full stack is replaced by one of twice its size, `empty(size)`, all zeros: unfilled entries take no memory.
-    Many bodies close in more combinations than memory holds: a stack that has grown to ROOM gives away, as it is, the
-    least recently used index, by times (s,) of use.
+    A full stack is replaced by one of twice its size, or of ROOM, `empty(size)`, all zeros: unfilled entries take no
+    memory. Many bodies close in more combinations than memory holds: a stack of ROOM gives away, as it is, the least
+    recently used index, by times (s,) of use.
     """
     free = np.flatnonzero(filled == 0)
     if len(free):
         return stack, int(free[0])
     size = len(filled)
-    if 2 * sum(array.nbytes for array in stack) > ROOM:
-        return stack, int(np.argmin(used))
-    larger = empty(2 * size)
+    most = min(2 * size, ROOM // sum(array[:1].nbytes for array in stack))
+    return (_copied(stack, empty(most)), size) if most > size else (stack, int(np.argmin(used)))
+
+
+def _copied(stack: Any, larger: Any) -> Any:
+    """Return a larger stack with the entries of one."""
     for array, old in zip(larger, stack, strict=True):
-        array[:size] = old
-    return larger, size
+        array[tuple(map(slice, old.shape))] = old
+    return larger
 
 
 def places(empty: Callable[[int], Any], room: int) -> int:
@@ -76,8 +79,13 @@ class Known:
         matches = np.flatnonzero((self.stack.number > 0) & self._same(self.stack, system, key))
         if len(matches):
             return int(matches[0])
-        numbers, values = self.stack.number, self._of(system, key)
-        self.stack, k = with_free_place(self.stack, numbers, lambda size: self._empty(system, size), numbers)
+        values, numbers, room = self._of(system, key), self.stack.number, self.stack.eigenvalue.shape[1]
+        modes = max(values["modes"], room)
+        if modes > room:
+            self.stack = _copied(self.stack, self._empty(system, len(numbers), modes))
+        # at random: a motion that meets more than fit, period by period, would find none of the latest
+        used = np.random.default_rng(numbers.max()).random(len(numbers))
+        self.stack, k = with_free_place(self.stack, numbers, lambda size: self._empty(system, size, modes), used)
         for name, value in values.items():
             getattr(self.stack, name)[(k, *map(slice, np.shape(value)))] = value
         self.stack.number[k] = next(_NUMBERS)

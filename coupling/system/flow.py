@@ -58,8 +58,8 @@ def matrices(system: System, motions: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return matrix (n, m) @ columns (m, c), where only the latter may be complex."""
-    if columns.dtype != complex:
+    """Return the product of matrices (n, m) and (m, c). Of a real and a complex one, numpy would make complex ones."""
+    if columns.dtype != complex or matrix.dtype == complex:
         return np.asarray(matrix @ columns)
     return np.asarray(matrix @ np.ascontiguousarray(columns).view(float)).view(complex)
 

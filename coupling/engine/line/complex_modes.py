@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from vanedamp.coupling.engine.known import IllConditioned
 from vanedamp.coupling.engine.line.tolerances import ALIKE, INDEPENDENT, LIGHT, MANY, MIXED, SETTLED, SHIFTS, STEPS
 from vanedamp.coupling.numerics.tolerances import DEFECTIVE, LOST, NEARLY_EQUAL
+from vanedamp.coupling.system.flow import times
 
 _EPS = float(np.finfo(float).eps)
 #: complex numbers in a batch of eigenpairs that are polished at once
@@ -171,7 +172,7 @@ def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np
     """Return `complex_modes` of real ones that damping hardly couples; None where they are not found."""
     diag = np.diag(damping)
     with np.errstate(all="ignore"):  # numbers of a fixed point that is none
-        modes = None if np.any(diag >= w) else _fixed_point(w, diag, damping - np.diag(diag))
+        modes = None if np.any(diag >= w) else fixed_point(w, diag, damping - np.diag(diag))
     if modes is None:
         return None
     values, shapes = modes
@@ -183,16 +184,17 @@ def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np
     return np.r_[values, values.conj()], np.hstack([right, right.conj()]), np.vstack([left, left.conj()])
 
 
-def _fixed_point(w: np.ndarray, diag: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def fixed_point(w: np.ndarray, diag: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Return upper eigenvalues (k,) and displacements (k, k) of modes, columns with 1 in their own real mode.
 
-    diag: (k,) damping of the real modes; apart: (k, k) that between them. Row k of the equation of mode k gives its
+    diag: (k,) damping of the undamped modes; apart: (k, k) that between them; neither need be symmetric or real, nor w.
+    Row k of the equation of mode k gives its
     eigenvalue, the others its small parts in other real modes. None where these do not settle, or are not small.
     """
     diagonal = np.arange(len(w))
     shapes = older = np.eye(len(w), dtype=complex)
     for _ in range(STEPS):
-        coupling = (apart @ shapes.view(float)).view(complex)
+        coupling = times(apart, shapes)
         half = (diag + coupling[diagonal, diagonal]) / 2
         values = -half + 1j * np.sqrt((w - half) * (w + half))
         stiffness = (values - 1j * w[:, None]) * (values + 1j * w[:, None]) + 2 * half[:, None] * values
@@ -200,7 +202,7 @@ def _fixed_point(w: np.ndarray, diag: np.ndarray, apart: np.ndarray) -> tuple[np
         # modes of equal frequencies have the same there
         coupling -= coupling[diagonal, diagonal][:, None] * older
         # below the round-off of the equation, which would mix such modes
-        stiffness[np.abs(coupling) <= _EPS * w] = np.inf
+        stiffness[np.abs(coupling) <= _EPS * np.abs(w)] = np.inf
         older, shapes = shapes, -values * coupling / stiffness
         shapes[diagonal, diagonal] = 1.0
         if float(np.abs(shapes - older).max()) <= SETTLED:

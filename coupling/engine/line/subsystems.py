@@ -19,6 +19,7 @@ from vanedamp.coupling.engine.line.complex_modes import RealModes, complex_modes
 from vanedamp.coupling.engine.line.tolerances import DRIVEN, FAR, MANY, MOVES_ALIKE, SURE, UNFELT, UNSEEN
 from vanedamp.coupling.numerics.compiler.record import record_with, room
 from vanedamp.coupling.numerics.tolerances import CANCELLED, LOST
+from vanedamp.coupling.system.flow import times
 from vanedamp.coupling.system.line_system import LineSystem
 
 
@@ -127,9 +128,9 @@ def _subsystem(system: LineSystem, key: np.ndarray) -> dict[str, Any]:
     real, lift, drop, loads, projector = _real_modes(system, carrier, cluster, inner, springs, sprung, law)
     q, (eigenvalue, shape, project) = len(drop), _complex_modes(real)
     m = len(eigenvalue)
-    push, coalescing = _times(loads.T, project[:, q:].T).T, coalesce(eigenvalue, shape, project)
-    shape = np.stack([_times(lift, part) for part in shape.reshape(2, q, m)])
-    project = np.stack([_times(drop.T, part.T).T for part in (project[:, :q], project[:, q:])], axis=1)
+    push, coalescing = times(loads.T, project[:, q:].T).T, coalesce(eigenvalue, shape, project)
+    shape = np.stack([times(lift, part) for part in shape.reshape(2, q, m)])
+    project = np.stack([times(drop.T, part.T).T for part in (project[:, :q], project[:, q:])], axis=1)
     free = (cluster >= 0) & ~springs.anchored
     together = free & free[:, None] & (springs.cluster == springs.cluster[:, None])
     acceleration = together / np.maximum(together @ system.mass[n:], np.finfo(float).tiny)[:, None]
@@ -147,7 +148,7 @@ def _subsystem(system: LineSystem, key: np.ndarray) -> dict[str, Any]:
         "shape": shape[:, :n].reshape(2 * n, m).T, "support": _support(shape[:, :n]), "slip_shape": shape[0, n:].T,
         "project": project[:, :, :n].reshape(m, 2 * n), "project_slip": project[:, :, n:].reshape(m, 2 * b),
         "reach": _support(project[:, :, :n].transpose(1, 2, 0)), "tied": len(projector) > 0, "push": push,
-        "impulse_response": _times(system.J[:, :n], project[:, 1, :n].T),
+        "impulse_response": times(system.J[:, :n], project[:, 1, :n].T),
     }  # fmt: skip
 
 
@@ -195,11 +196,6 @@ def _complex_modes(real: RealModes) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return values[keep], vectors[:, keep] * np.where(values[keep].imag > 0, 2.0, 1.0), inverse[keep]
 
 
-def _times(real: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the product of a real matrix (i, k) and a complex one (k, j), which numpy would make a complex one."""
-    return (real @ np.ascontiguousarray(values).view(float)).view(complex)
-
-
 def _support(shape: np.ndarray) -> np.ndarray:
     """Return the first coordinate p of each mode's p and p' (2, n, m) that is not zero, and the last plus 1 (m, 2)."""
     _, n, m = shape.shape
@@ -215,8 +211,8 @@ def _functionals(
     """Return bodies, rows and response as functionals of the modes, and the modes' sizes. shape: (N, m)."""
     n = system.modes
     p, slips = shape[:n], shape[n:]
-    body, of_bodies = _times(carrier, p) + slips, system.J[:, n:]
-    motion = _times(functional, p) + _times(of_bodies, slips)
+    body, of_bodies = times(carrier, p) + slips, system.J[:, n:]
+    motion = times(functional, p) + times(of_bodies, slips)
     # terms by their sizes: a mode may move no row while others are closed
     held = np.abs(functional) @ np.abs(p)
     terms = held + np.abs(of_bodies) @ np.abs(slips)
@@ -250,9 +246,9 @@ def _forces(
     pull = -np.hstack([on_structure * system.stiffness[:n], on_structure @ system.damping[:n, :n]])
     if len(rigid):
         inverse = np.linalg.inv(system.delassus[np.ix_(rigid, rigid)])
-        acceleration = _times(pull[rigid], structure) + system.delassus[np.ix_(rigid, sprung)] @ force[sprung]
+        acceleration = times(pull[rigid], structure) + system.delassus[np.ix_(rigid, sprung)] @ force[sprung]
         size = np.abs(pull[rigid]) @ np.abs(structure)
-        held = _times(-inverse, acceleration)
+        held = times(-inverse, acceleration)
         # a contact without force has none, not round-off, or it would open and close at every tick of the clock
         held[np.abs(held) <= CANCELLED * (np.abs(inverse) @ size)] = 0.0
         force[rigid], closed_inverse[np.ix_(rigid, rigid)] = held, inverse

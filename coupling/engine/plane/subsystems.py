@@ -19,6 +19,8 @@ import numpy as np
 
 from vanedamp.coupling.engine.coalescence import coalesce
 from vanedamp.coupling.engine.known import IllConditioned, Known, known_of
+from vanedamp.coupling.engine.line.complex_modes import fixed_point
+from vanedamp.coupling.engine.line.tolerances import MANY, SETTLED
 from vanedamp.coupling.engine.plane.tolerances import APART, RANK, REFINED, SPLIT
 from vanedamp.coupling.numerics.codes import OPEN, SLIP_LEFT, SLIP_RIGHT
 from vanedamp.coupling.numerics.compiler.record import record_with, room
@@ -85,12 +87,12 @@ class PlanarSubsystems(NamedTuple):
     coalescing: Annotated[np.ndarray, "k", bool]
 
 
-def empty_subsystems(system: System, capacity: int | None = None) -> PlanarSubsystems:
-    """Return storage for `capacity` subsystems of a system."""
+def empty_subsystems(system: System, capacity: int | None = None, modes: int = 0) -> PlanarSubsystems:
+    """Return storage for `capacity` subsystems of a system, of so many modes or, of many, at first one a stretch."""
     q = most_stretches(system)
     return room(PlanarSubsystems, {
         "k": capacity or 8, "u": len(system.rest), "N": len(system.mass), "j": len(system.tangential), "q": q,
-        "m": 2 * q,
+        "m": modes or (q if q >= MANY else 2 * q),
     })  # fmt: skip
 
 
@@ -266,11 +268,15 @@ def _separate_modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndar
     if not k:
         return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
     scale = np.sqrt(np.abs(stiffness).max())
-    matrix = np.zeros((2 * k, 2 * k))
-    matrix[:k, k:], matrix[k:, :k], matrix[k:, k:] = np.eye(k) * scale, -stiffness / scale, -damping
-    values, vectors = np.linalg.eig(matrix)
-    kept = values.imag >= 0.0
-    values, vectors = values[kept] + 0j, vectors[:, kept] + 0j
+    modes = _lightly_coupled(stiffness, damping) if k >= MANY else None
+    if modes is None:
+        matrix = np.zeros((2 * k, 2 * k))
+        matrix[:k, k:], matrix[k:, :k], matrix[k:, k:] = np.eye(k) * scale, -stiffness / scale, -damping
+        values, vectors = np.linalg.eig(matrix)
+        kept = values.imag >= 0.0
+        values, vectors = values[kept] + 0j, vectors[:, kept] + 0j
+    else:
+        values, vectors = modes[0], np.concatenate([modes[1], modes[1] * modes[0] / scale])
     if not np.abs(values).min() > 0.0:
         raise IllConditioned("it has no stiffness")
     inverse = _inverse(vectors, values.imag > 0.0)
@@ -281,6 +287,25 @@ def _separate_modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndar
     vectors[k:] *= scale
     inverse[:, k:] /= scale
     return values, vectors, inverse
+
+
+def _lightly_coupled(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return upper eigenvalues (k,) and shapes (k, k) of undamped modes that damping hardly couples, or None.
+
+    In a small part of the time: most of that of the linear problem of size 2k goes into pairs.
+    """
+    squares, shapes = np.linalg.eig(stiffness)
+    if not squares.real.min() > 0.0:
+        return None
+    inside = np.linalg.solve(shapes, times(damping, shapes))
+    with np.errstate(all="ignore"):  # numbers of a fixed point that is none
+        modes = fixed_point(np.sqrt(squares), np.diag(inside), inside - np.diag(np.diag(inside)))
+    if modes is None or not modes[0].imag.min() > 0.0:
+        return None
+    values, shapes = modes[0], times(shapes, modes[1])
+    shapes /= np.linalg.norm(shapes, axis=0)
+    force = times(stiffness, shapes) + values * (times(damping, shapes) + values * shapes)
+    return (values, shapes) if np.abs(force).max() <= SETTLED * np.abs(stiffness).max() else None
 
 
 def _inverse(vectors: np.ndarray, pairs: np.ndarray) -> np.ndarray:
