@@ -9,7 +9,8 @@ from __future__ import annotations
 import itertools
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,26 +29,24 @@ class IllConditioned(ArithmeticError):
     """Doubles cannot separate the modes of a subsystem, or have lost too many digits in them."""
 
 
-def with_free_place(stack: Any, filled: np.ndarray, empty: Callable[[int], Any], used: np.ndarray) -> tuple[Any, int]:
+def with_free_place(
+    stack: Any, filled: np.ndarray, used: np.ndarray, values: Mapping[str, Any] = MappingProxyType({})
+) -> tuple[Any, int]:
     """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
 
-    A full stack is replaced by one of twice its size, or of ROOM, `empty(size)`, all zeros: unfilled entries take no
-    memory. Many bodies close in more combinations than memory holds: a stack of ROOM gives away, as it is, the least
-    recently used index, by times (s,) of use.
+    A full stack is replaced by one of twice its size, or of ROOM, and one for larger `values` by a wider one. Unfilled
+    entries are zeros, which take no memory. Many bodies close in more combinations than memory holds: a stack of ROOM
+    gives away, as it is, the least recently used index, by times (s,) of use.
     """
-    free = np.flatnonzero(filled == 0)
-    if len(free):
-        return stack, int(free[0])
-    size = len(filled)
-    most = min(2 * size, ROOM // sum(array[:1].nbytes for array in stack))
-    return (_copied(stack, empty(most)), size) if most > size else (stack, int(np.argmin(used)))
-
-
-def _copied(stack: Any, larger: Any) -> Any:
-    """Return a larger stack with the entries of one."""
-    for array, old in zip(larger, stack, strict=True):
-        array[tuple(map(slice, old.shape))] = old
-    return larger
+    size, free = len(filled), np.flatnonzero(filled == 0)
+    most = size if len(free) else max(size, min(2 * size, ROOM // sum(array[:1].nbytes for array in stack)))
+    larger = {}
+    for name, old in zip(stack._fields, stack, strict=True):
+        shape = most, *map(max, old.shape[1:], np.shape(values.get(name, old[0])))
+        if shape != old.shape:
+            larger[name] = np.zeros(shape, old.dtype)
+            larger[name][tuple(map(slice, old.shape))] = old
+    return stack._replace(**larger), int(free[0] if len(free) else size if most > size else np.argmin(used))
 
 
 def places(empty: Callable[[int], Any], room: int) -> int:
@@ -58,15 +57,15 @@ def places(empty: Callable[[int], Any], room: int) -> int:
 class Known:
     """The subsystems met of late, of a system and of those that differ in the excitation.
 
-    empty: returns storage for subsystems of a system, for some number of them (None: a few); of: returns their fields
-    by name, from a system and its key; same: tells which entries have a key in a system.
+    stack: storage for some; of: returns their fields by name, from a system and its key; same: tells which entries have
+    a key in a system.
     """
 
     def __init__(
-        self, system: Any, empty: Callable[..., Any], of: Callable[[Any, np.ndarray], dict[str, Any]],
+        self, stack: Any, of: Callable[[Any, np.ndarray], dict[str, Any]],
         same: Callable[[Any, Any, np.ndarray], np.ndarray],
     ) -> None:  # fmt: skip
-        self.stack, self._empty, self._of, self._same = empty(system, None), empty, of, same
+        self.stack, self._of, self._same = stack, of, same
 
     def __bool__(self) -> bool:
         return bool(self.stack.number.any())
@@ -79,13 +78,8 @@ class Known:
         matches = np.flatnonzero((self.stack.number > 0) & self._same(self.stack, system, key))
         if len(matches):
             return int(matches[0])
-        values, numbers, room = self._of(system, key), self.stack.number, self.stack.eigenvalue.shape[1]
-        modes = max(values["modes"], room)
-        if modes > room:
-            self.stack = _copied(self.stack, self._empty(system, len(numbers), modes))
-        # at random: a motion that meets more than fit, period by period, would find none of the latest
-        used = np.random.default_rng(numbers.max()).random(len(numbers))
-        self.stack, k = with_free_place(self.stack, numbers, lambda size: self._empty(system, size, modes), used)
+        numbers, values = self.stack.number, self._of(system, key)
+        self.stack, k = with_free_place(self.stack, numbers, numbers, values)
         for name, value in values.items():
             getattr(self.stack, name)[(k, *map(slice, np.shape(value)))] = value
         self.stack.number[k] = next(_NUMBERS)
@@ -137,9 +131,9 @@ def add_known(same, fill, system, subsystems, key, flows, scratch):
     return NEEDS_FLOW
 
 
-def with_place(flows: Any, known: Known, k: int, empty: Callable[[int], Any]) -> Any:
+def with_place(flows: Any, known: Known, k: int) -> Any:
     """Return flows with an index for subsystem k, which compiled code fills: its own, a free one, or the oldest."""
     if not np.any(flows.subsystem == known.stack.number[k]):
-        flows, s = with_free_place(flows, flows.subsystem, empty, flows.used)
+        flows, s = with_free_place(flows, flows.subsystem, flows.used)
         flows.subsystem[s] = flows.modes[s] = 0
     return flows

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -65,7 +65,7 @@ class EventDrivenRun(ABC):
     #: the compiled function, and whether a scene is so common that it is compiled for its lengths
     compiled: ClassVar[Any]
     is_common: ClassVar[Any]
-    #: make, for a system: known subsystems, room for flows (and some number of them), room to fill these; and with a
+    #: make, for a system: known subsystems, room for flows, room to fill these; and with a
     #: number of modes state, event functions and scratch space
     rooms: ClassVar[tuple[Callable[..., Any], ...]]
     #: name of the subsystem's key in the state
@@ -89,8 +89,8 @@ class EventDrivenRun(ABC):
         self.statistics, self.trace, self.status = UNJUDGED, UNTRACED, Status.OK
         self.reader: Callable[[np.ndarray], int] = lambda _: 0
         self.begin_from(start)
-        known, self._empty_flows, to_fill, *of_modes = self.rooms
-        self.known, self.flows, self.assembly = known(system), self._empty_flows(system), to_fill(system)
+        known, flows, to_fill, *of_modes = self.rooms
+        self.known, self.flows, self.assembly = known(system), flows(system), to_fill(system)
         modes = self.flows.eigenvalue.shape[1]
         self.state, self.watched, self.scratch = (room(system, modes) for room in of_modes)
         self._run = self.compiled
@@ -142,7 +142,7 @@ class EventDrivenRun(ABC):
     def _add_flow(self) -> None:
         """Find the state's subsystem, and an index for it. Raises IllConditioned, LinAlgError."""
         k = self.known.place(self.system, getattr(self.state, self.key))
-        self.flows = with_place(self.flows, self.known, k, partial(self._empty_flows, self.system))
+        self.flows = with_place(self.flows, self.known, k)
 
     def run_many(self, job: BatchArrays, columns: Columns, statistics: tuple[Any, ...]) -> int:
         """Continue the scenes of a job. Return the code DONE, or OUTSIDE for one that it cannot run.

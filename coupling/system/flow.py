@@ -77,8 +77,8 @@ class StateFlow:
     its force on to its driver. rubs: (u,) whether units have friction; way: (u,) direction in which they slip, or 0;
     drag: (u,) friction per normal force.
     closed, pressed: rigid and compliant contacts with forces; touching: rigid ones that are closed; stick: units whose
-    slips are kept at rest; slides: friction elements that slip, with the forces `known`; holds, follows: sliders (of j)
-    that rest, and the others; drivers: (j, N) motions by which the latter move.
+    slips are kept at rest; slides: friction elements that slip, with the forces `known`; holds: sliders (of j) that
+    rest; drivers: (j, N) motions by which the others move; follow: (j, N) motions of all.
     kept: (k,) rows at rest; wrench: (N, k) directions of their forces; push: (N, p) of those of compliant contacts;
     spring, dashpot: (p, N) and preload: (p,) their forces. stiffness, damping: (N, N); weight: (N,) without preload;
     load: (e, N). oblique: (N, N) accelerations by loads; carried: (k, N) forces of the kept rows by loads, the least
@@ -99,10 +99,11 @@ class StateFlow:
         self.stick, self.slides = np.flatnonzero((state == STICK) & self.rubs), np.flatnonzero(~contact & (way != 0))
         sprung = system.sprung
         rests = state[sprung] == STICK
-        self.holds, self.follows = np.flatnonzero(rests), np.flatnonzero(~rests)
+        self.holds = np.flatnonzero(rests)
         self.drawn = rows.copy()
         self.drawn[u + sprung] += system.elongation / root
         self.drivers = self.drawn[u + sprung] + (way[sprung] * system.ease)[:, None] * rows[sprung]
+        self.follow = self.drivers * (root[len(root) - self.sliders :] * ~rests)[:, None]
         self.kept, self.known = np.concatenate([self.closed, u + self.stick]), -(way * system.limit)[self.slides]
         self.wrench = wrenches(rows, self.closed, self.drag[self.closed], self.stick)
         self.push = wrenches(self.drawn, self.pressed, self.drag[self.pressed], self.stick[:0])
@@ -123,13 +124,6 @@ class StateFlow:
     def stuck(self) -> np.ndarray:
         """Whether units (u,) stick."""
         return (self.state == STICK) & self.rubs
-
-    @cached_property
-    def follow(self) -> np.ndarray:
-        """Motions of sliders (j, N) by those of their drivers."""
-        follow, massive = np.zeros_like(self.drivers), len(self.root) - self.sliders
-        follow[self.follows, :massive] = (self.root[massive:, None] * self.drivers[:, :massive])[self.follows]
-        return follow
 
     @cached_property
     def inverse(self) -> np.ndarray:

@@ -170,9 +170,7 @@ def _critical(rate: float) -> IllConditioned:
 
 def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Return `complex_modes` of real ones that damping hardly couples; None where they are not found."""
-    diag = np.diag(damping)
-    with np.errstate(all="ignore"):  # numbers of a fixed point that is none
-        modes = None if np.any(diag >= w) else fixed_point(w, diag, damping - np.diag(diag))
+    modes = fixed_point(w, damping)
     if modes is None:
         return None
     values, shapes = modes
@@ -184,14 +182,17 @@ def _lightly_coupled(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np
     return np.r_[values, values.conj()], np.hstack([right, right.conj()]), np.vstack([left, left.conj()])
 
 
-def fixed_point(w: np.ndarray, diag: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return upper eigenvalues (k,) and displacements (k, k) of modes, columns with 1 in their own real mode.
+@np.errstate(all="ignore")  # numbers of a fixed point that is none
+def fixed_point(w: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return upper eigenvalues (k,) and displacements (k, k) of modes, columns with 1 in their own undamped mode.
 
-    diag: (k,) damping of the undamped modes; apart: (k, k) that between them; neither need be symmetric or real, nor w.
-    Row k of the equation of mode k gives its
-    eigenvalue, the others its small parts in other real modes. None where these do not settle, or are not small.
+    These need not be real, nor damping symmetric. Row k of the equation of mode k gives its eigenvalue, the others its
+    small parts in other undamped modes. None where these do not settle, or are not small.
     """
-    diagonal = np.arange(len(w))
+    diagonal, diag = np.arange(len(w)), np.diag(damping)
+    if np.any(np.abs(diag) >= np.abs(w)):
+        return None
+    apart = damping - np.diag(diag)
     shapes = older = np.eye(len(w), dtype=complex)
     for _ in range(STEPS):
         coupling = times(apart, shapes)

@@ -108,7 +108,7 @@ _DECIDING = ("mass", "stiffness", "damping", "response", "floor", "J", "spring",
 
 def new_known(system: LineSystem) -> Known:
     """Return room for the subsystems of a system."""
-    return Known(system, empty_subsystems, _subsystem, lambda stack, _, closed: (stack.closed == closed).all(axis=1))
+    return Known(empty_subsystems(system), _subsystem, lambda stack, _, closed: (stack.closed == closed).all(axis=1))
 
 
 def known_subsystems(system: LineSystem) -> Known:

@@ -93,12 +93,12 @@ class PlanarFlows(NamedTuple):
     slow_lost: Annotated[np.ndarray, "s c pairs", complex]
 
 
-def empty_flows(system: System, capacity: int = 8) -> PlanarFlows:
-    """Storage for `capacity` flows."""
+def empty_flows(system: System) -> PlanarFlows:
+    """Storage for some flows."""
     u, e, sprung = len(system.rest), len(system.frequency), np.isfinite(system.spring)
     m = e + 2 * most_stretches(system)
     return room(PlanarFlows, {
-        "s": capacity, "u": u, "m": m, "N": len(system.mass), "e": e, "b": system.bodies, "phases": e + 1,
+        "s": 8, "u": u, "m": m, "N": len(system.mass), "e": e, "b": system.bodies, "phases": e + 1,
         "grids": GRIDS, "k": len(system.outputs), "maps": WORK_MAP + 4 * e, "c": int(sprung.sum()),
         "pairs": m * (m + 3),
     })  # fmt: skip

@@ -87,18 +87,13 @@ class PlanarSubsystems(NamedTuple):
     coalescing: Annotated[np.ndarray, "k", bool]
 
 
-def empty_subsystems(system: System, capacity: int | None = None, modes: int = 0) -> PlanarSubsystems:
-    """Return storage for `capacity` subsystems of a system, of so many modes or, of many, at first one a stretch."""
-    q = most_stretches(system)
-    return room(PlanarSubsystems, {
-        "k": capacity or 8, "u": len(system.rest), "N": len(system.mass), "j": len(system.tangential), "q": q,
-        "m": modes or (q if q >= MANY else 2 * q),
-    })  # fmt: skip
-
-
 def new_known(system: System) -> Known:
-    """Return room for the subsystems of a system."""
-    return Known(system, empty_subsystems, _subsystem, _same)
+    """Return room for the subsystems of a system: where there are many stretches, for pairs of modes at first."""
+    q = most_stretches(system)
+    return Known(room(PlanarSubsystems, {
+        "k": 8, "u": len(system.rest), "N": len(system.mass), "j": len(system.tangential), "q": q,
+        "m": q if q >= MANY else 2 * q,
+    }), _subsystem, _same)  # fmt: skip
 
 
 def known_subsystems(system: System) -> Known:
@@ -172,13 +167,11 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
     constraints, held = flow.rows[flow.kept, :massive], np.zeros((size, size))
     constraints = constraints[constraints.any(axis=1)]  # others are those of sliders
     if len(basis) and len(constraints):
-        # both are orthonormal: singular values are sines, and constrained directions have none above round-off
-        allowed = null_space(constraints)
-        turned, sine = allowed.T, np.ones(allowed.shape[1])
+        inner = np.pad(null_space(constraints).T, ((0, 0), (0, sliders)))
         if len(basis) < massive:
-            turned, sine, _ = np.linalg.svd(basis[:, :massive] @ allowed, full_matrices=False)
-            turned = turned.T @ basis[:, :massive]
-        inner = np.pad(turned[sine > SINGULAR], ((0, 0), (0, sliders)))
+            # both are orthonormal: singular values are sines, and constrained directions have none above round-off
+            turned, sine, _ = np.linalg.svd(basis @ inner.T, full_matrices=False)
+            inner = turned[:, sine > SINGULAR].T @ basis
         if len(inner) < len(basis):
             held = basis.T @ basis - inner.T @ inner
             held[np.abs(held) < HELD_ROUND_OFF] = 0.0
@@ -188,53 +181,41 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
     pushed, elastic, viscous = inner @ oblique, stiffness @ inner.T, damping @ inner.T
     spring, dashpot = flow.spring @ inner.T, flow.dashpot @ inner.T
     own, loss = pushed @ elastic, pushed @ viscous
-    eigenvalue, shape, project = _modes(own, loss)
-    order = np.argsort(np.abs(eigenvalue), kind="stable")
-    rate, shape, project = eigenvalue[order], shape[:, order], project[order]
-    # constant part, of loads and of displacements that constraints hold; that of a preload is a solution of its own: by
-    # the inverse, a large one would leave its round-off
+    rate, shape, project = _modes(own, loss)
+    order = np.argsort(np.abs(rate), kind="stable")
+    rate, shape, project = rate[order], shape[:, order], project[order]
+    # constant part, of loads and of displacements that constraints hold; of a preload a solution of its own: by the
+    # inverse, a large one would leave its round-off
     still = np.linalg.solve(own, np.column_stack([pushed, pushed @ (push @ preload)]))
     rest, still = still[:, :-1] @ flow.weight - still[:, -1], still[:, :-1]
     weight, rest_held = flow.weight - push @ preload, -still @ (stiffness @ held[:, fixed])
     displaced = held[:, fixed] + inner.T @ rest_held
     eta, springs = shape[:k], len(pressed) > 0 or len(holds) > 0
-    turn = eta * rate
-    net, net_constant, net_held = (
-        -times(elastic, eta) - times(viscous, turn),
-        weight - elastic @ rest,
-        -stiffness @ displaced,
-    )
+    turn, net_constant, net_held = eta * rate, weight - elastic @ rest, -stiffness @ displaced
+    net = -times(elastic, eta) - times(viscous, turn)
     motion, bend, bend_held = times(oblique, net) / rate**2, oblique @ net_constant, oblique @ net_held
     if springs:  # forces of stiff springs nearly cancel: their stretches are more accurate
         motion += times(inner.T, eta - times(inner, motion))
         bend, bend_held = bend - inner.T @ (inner @ bend), bend_held - inner.T @ (inner @ bend_held)
     motion = flow.settled(motion, net / rate**2) / root[:, None]
     bend, bend_held = flow.followed(bend), flow.followed(bend_held)
-    both = (times((inner * root).T, part.T).T for part in (project[:, :k], project[:, k:]))
-    free = np.concatenate([*both], axis=1)
+    free = np.concatenate([times((inner * root).T, part.T) for part in (project[:, :k], project[:, k:])]).T
     free[:, fixed] -= times(rest_held.T, project[:, :k].T).T * root[fixed]
     turned, terms = times(system.J, motion), np.abs(system.J) @ np.abs(motion)
     force_constant = flow.spread(flow.carried @ net_constant, -preload - spring @ rest)
     force_constant[flow.u + flow.slides] = flow.known
-    none = np.zeros((len(flow.kept), k))
-
-    def by_held(parts: np.ndarray) -> np.ndarray:
-        whole = np.zeros((len(parts), size))
-        whole[:, fixed] = parts * root[fixed]
-        return whole
-
+    none, by_held = np.zeros((len(flow.kept), k)), np.zeros((size + 2 * flow.u, size))
+    force_held = flow.spread(flow.carried @ net_held, -flow.spring @ displaced)
+    by_held[:, fixed] = np.concatenate([bend_held / root[:, None], force_held]) * root[fixed]
     slips = (state == SLIP_LEFT) | (state == SLIP_RIGHT)
     pushes = np.isfinite(system.spring) & (state < OPEN)
     return {
         "state": state, "slips": slips, "friction": system.friction, "limit": system.limit, "pressed": pushes,
         "rest": system.rest, "stretches": k, "own": own, "loss": loss, "inner": inner, "pushed": pushed,
-        "elastic": elastic, "viscous": viscous, "springs": springs,
-        "slide": np.sqrt((system.tangential[holds] * mobility).max(initial=0.0)),
-        "oblique": oblique, "follow": flow.follow,
-        "carry": flow.spread(flow.carried), "spring": flow.spread(none, -spring),
-        "dashpot": flow.spread(none, -dashpot),
-        "bend": bend / root, "bend_held": by_held(bend_held / root[:, None]), "force_constant": force_constant,
-        "force_held": by_held(flow.spread(flow.carried @ net_held, -flow.spring @ displaced)),
+        "elastic": elastic, "viscous": viscous, "springs": springs, "oblique": oblique, "follow": flow.follow,
+        "slide": np.sqrt((system.tangential[holds] * mobility).max(initial=0.0)), "carry": flow.spread(flow.carried),
+        "spring": flow.spread(none, -spring), "dashpot": flow.spread(none, -dashpot), "bend": bend / root,
+        "bend_held": by_held[:size], "force_constant": force_constant, "force_held": by_held[size:],
         "modes": len(rate), "eigenvalue": rate, "motion": motion,
         "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
         "force": flow.spread(times(flow.carried, net), -times(spring, eta) - times(dashpot, turn)),
@@ -264,19 +245,19 @@ def _modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.n
 
 def _separate_modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return _modes of a problem no two of whose modes are one; raises IllConditioned for others."""
-    k = len(stiffness)
+    k, none = len(stiffness), np.zeros((0, 0), complex)
     if not k:
-        return np.zeros(0, complex), np.zeros((0, 0), complex), np.zeros((0, 0), complex)
+        return none.ravel(), none, none
     scale = np.sqrt(np.abs(stiffness).max())
     modes = _lightly_coupled(stiffness, damping) if k >= MANY else None
-    if modes is None:
+    if modes:
+        values, vectors = modes[0], np.concatenate([modes[1], modes[1] * modes[0] / scale])
+    else:
         matrix = np.zeros((2 * k, 2 * k))
         matrix[:k, k:], matrix[k:, :k], matrix[k:, k:] = np.eye(k) * scale, -stiffness / scale, -damping
         values, vectors = np.linalg.eig(matrix)
         kept = values.imag >= 0.0
         values, vectors = values[kept] + 0j, vectors[:, kept] + 0j
-    else:
-        values, vectors = modes[0], np.concatenate([modes[1], modes[1] * modes[0] / scale])
     if not np.abs(values).min() > 0.0:
         raise IllConditioned("it has no stiffness")
     inverse = _inverse(vectors, values.imag > 0.0)
@@ -290,34 +271,29 @@ def _separate_modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndar
 
 
 def _lightly_coupled(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return upper eigenvalues (k,) and shapes (k, k) of undamped modes that damping hardly couples, or None.
-
-    In a small part of the time: most of that of the linear problem of size 2k goes into pairs.
-    """
+    """Return upper eigenvalues (k,) and shapes (k, k) of undamped modes that damping hardly couples, or None."""
     squares, shapes = np.linalg.eig(stiffness)
     if not squares.real.min() > 0.0:
         return None
-    inside = np.linalg.solve(shapes, times(damping, shapes))
-    with np.errstate(all="ignore"):  # numbers of a fixed point that is none
-        modes = fixed_point(np.sqrt(squares), np.diag(inside), inside - np.diag(np.diag(inside)))
-    if modes is None or not modes[0].imag.min() > 0.0:
+    if not (modes := fixed_point(np.sqrt(squares), np.linalg.solve(shapes, times(damping, shapes)))):
         return None
     values, shapes = modes[0], times(shapes, modes[1])
     shapes /= np.linalg.norm(shapes, axis=0)
     force = times(stiffness, shapes) + values * (times(damping, shapes) + values * shapes)
-    return (values, shapes) if np.abs(force).max() <= SETTLED * np.abs(stiffness).max() else None
+    exact = values.imag.min() > 0.0 and np.abs(force).max() <= SETTLED * np.abs(stiffness).max()
+    return (values, shapes) if exact else None
 
 
 def _inverse(vectors: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Return the inverse (c, 2k) of vectors (2k, c), whose lengths it sets to one; of `pairs` one is given.
+    """Return the inverse (c, 2k) of vectors (2k, c), of `pairs` one, twice; sets their lengths to one.
 
-    A unitary matrix makes real and imaginary parts, times sqrt(2), of a pair: the condition stays.
+    Real and imaginary parts, times sqrt(2), are a pair times a unitary matrix: the condition stays.
     """
     vectors /= np.linalg.norm(vectors, axis=0)
     factor = np.where(pairs, np.sqrt(2.0), 1.0)
     both = np.concatenate([vectors.real * factor, (vectors.imag * factor)[:, pairs]], axis=1)
     solved = np.linalg.inv(both)
-    # the first is larger, and at hand
+    # Frobenius' norms, at hand, bound it
     if not np.linalg.norm(both) * np.linalg.norm(solved) <= DEFECTIVE and np.linalg.cond(both) > DEFECTIVE:
         raise IllConditioned("its modes are one to round-off")
     inverse = solved[: len(pairs)] + 0j

@@ -28,7 +28,7 @@ def add_flow(flows, system, closed):
     """The flows with that of the closed rows (r,), at a place that was free."""
     known = new_known(system)
     k = known.place(system, closed)
-    flows = with_place(flows, known, k, lambda size: empty_flows(system, size))
+    flows = with_place(flows, known, k)
     s = int(np.flatnonzero(flows.subsystem == 0)[0])
     if not fill(system, known.stack, k, flows, s, new_assembly_scratch(system)):
         raise IllConditioned("its modes cancel, it rests too far away, or nothing damps its resonance")
