@@ -186,7 +186,7 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
     rate, shape, project = rate[order], shape[:, order], project[order]
     # constant part, of loads and of displacements that constraints hold; of a preload a solution of its own: by the
     # inverse, a large one would leave its round-off
-    still = np.linalg.solve(own, np.column_stack([pushed, pushed @ (push @ preload)]))
+    still = np.linalg.solve(own, np.column_stack([pushed, pushed @ push @ preload]))
     rest, still = still[:, :-1] @ flow.weight - still[:, -1], still[:, :-1]
     weight, rest_held = flow.weight - push @ preload, -still @ (stiffness @ held[:, fixed])
     displaced = held[:, fixed] + inner.T @ rest_held
