@@ -34,9 +34,9 @@ def with_free_place(
 ) -> tuple[Any, int]:
     """Return a stack of arrays with a free index, and this index: the first one that is not filled (s,).
 
-    A full stack is replaced by one of twice its size, or of ROOM, and one for larger `values` by a wider one. Unfilled
-    entries are zeros, which take no memory. Many bodies close in more combinations than memory holds: a stack of ROOM
-    gives away, as it is, the least recently used index, by times (s,) of use.
+    A full stack is replaced by one of twice its size, at most of ROOM, and by a wider one for larger `values`. Zeros
+    take no memory. Many bodies close in more combinations than memory holds: a stack of ROOM gives away, as it is, the
+    least recently used index, by times (s,) of use.
     """
     size, free = len(filled), np.flatnonzero(filled == 0)
     most = size if len(free) else max(size, min(2 * size, ROOM // sum(array[:1].nbytes for array in stack)))

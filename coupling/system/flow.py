@@ -58,7 +58,7 @@ def matrices(system: System, motions: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return the product of matrices (n, m) and (m, c). Of a real and a complex one, numpy would make complex ones."""
+    """Return matrix @ columns; numpy would make a real matrix complex for complex columns."""
     if columns.dtype != complex or matrix.dtype == complex:
         return np.asarray(matrix @ columns)
     return np.asarray(matrix @ np.ascontiguousarray(columns).view(float)).view(complex)

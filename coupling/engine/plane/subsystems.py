@@ -13,6 +13,7 @@ subsystem at a frequency.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -162,7 +163,6 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
         raise IllConditioned("its friction forces have no solution")
     root, pressed, push, holds = flow.root, flow.pressed, flow.push, flow.holds
     stiffness, damping, oblique, preload = flow.stiffness, flow.damping, flow.oblique, flow.preload
-    mobility = ((system.elongation[holds] / root)[:, :massive] ** 2).sum(axis=1)
     inner = basis = _stretched(system, np.concatenate([system.J[pressed], system.elongation[holds]]))
     constraints, held = flow.rows[flow.kept, :massive], np.zeros((size, size))
     constraints = constraints[constraints.any(axis=1)]  # others are those of sliders
@@ -177,7 +177,6 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
             held[np.abs(held) < HELD_ROUND_OFF] = 0.0
     k = len(inner)  # eta = inner sqrt(M) q
     held[massive + holds, massive + holds] = 1.0
-    fixed = np.flatnonzero(held.any(axis=0))
     pushed, elastic, viscous = inner @ oblique, stiffness @ inner.T, damping @ inner.T
     spring, dashpot = flow.spring @ inner.T, flow.dashpot @ inner.T
     own, loss = pushed @ elastic, pushed @ viscous
@@ -188,8 +187,8 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
     # inverse, a large one would leave its round-off
     still = np.linalg.solve(own, np.column_stack([pushed, pushed @ push @ preload]))
     rest, still = still[:, :-1] @ flow.weight - still[:, -1], still[:, :-1]
-    weight, rest_held = flow.weight - push @ preload, -still @ (stiffness @ held[:, fixed])
-    displaced = held[:, fixed] + inner.T @ rest_held
+    weight, rest_held = flow.weight - push @ preload, -still @ (stiffness @ held)
+    displaced = held + inner.T @ rest_held
     eta, springs = shape[:k], len(pressed) > 0 or len(holds) > 0
     turn, net_constant, net_held = eta * rate, weight - elastic @ rest, -stiffness @ displaced
     net = -times(elastic, eta) - times(viscous, turn)
@@ -199,14 +198,12 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
         bend, bend_held = bend - inner.T @ (inner @ bend), bend_held - inner.T @ (inner @ bend_held)
     motion = flow.settled(motion, net / rate**2) / root[:, None]
     bend, bend_held = flow.followed(bend), flow.followed(bend_held)
-    free = np.concatenate([times((inner * root).T, part.T) for part in (project[:, :k], project[:, k:])]).T
-    free[:, fixed] -= times(rest_held.T, project[:, :k].T).T * root[fixed]
+    parts = ((inner - rest_held) * root, project[:, :k]), (inner * root, project[:, k:])
     turned, terms = times(system.J, motion), np.abs(system.J) @ np.abs(motion)
     force_constant = flow.spread(flow.carried @ net_constant, -preload - spring @ rest)
     force_constant[flow.u + flow.slides] = flow.known
-    none, by_held = np.zeros((len(flow.kept), k)), np.zeros((size + 2 * flow.u, size))
-    force_held = flow.spread(flow.carried @ net_held, -flow.spring @ displaced)
-    by_held[:, fixed] = np.concatenate([bend_held / root[:, None], force_held]) * root[fixed]
+    none = np.zeros((len(flow.kept), k))
+    mobility = ((system.elongation[holds] / root)[:, :massive] ** 2).sum(axis=1)
     slips = (state == SLIP_LEFT) | (state == SLIP_RIGHT)
     pushes = np.isfinite(system.spring) & (state < OPEN)
     return {
@@ -215,12 +212,13 @@ def _subsystem(system: System, state: np.ndarray) -> dict[str, Any]:
         "elastic": elastic, "viscous": viscous, "springs": springs, "oblique": oblique, "follow": flow.follow,
         "slide": np.sqrt((system.tangential[holds] * mobility).max(initial=0.0)), "carry": flow.spread(flow.carried),
         "spring": flow.spread(none, -spring), "dashpot": flow.spread(none, -dashpot), "bend": bend / root,
-        "bend_held": by_held[:size], "force_constant": force_constant, "force_held": by_held[size:],
+        "bend_held": bend_held / root[:, None] * root, "force_constant": force_constant,
+        "force_held": flow.spread(flow.carried @ net_held, -flow.spring @ displaced) * root,
         "modes": len(rate), "eigenvalue": rate, "motion": motion,
         "rows": np.where(np.abs(turned) <= CANCELLED * terms, 0, turned),
         "force": flow.spread(times(flow.carried, net), -times(spring, eta) - times(dashpot, turn)),
-        "project": free, "offset": project[:, :k] @ rest, "split": project,
-        "coalescing": coalesce(rate, shape, project),
+        "project": np.concatenate([times(part.T, rows.T) for part, rows in parts]).T,
+        "offset": project[:, :k] @ rest, "split": project, "coalescing": coalesce(rate, shape, project),
     } | _projectors(flow)  # fmt: skip
 
 
@@ -233,7 +231,7 @@ def _modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.n
     """
     try:
         return _separate_modes(stiffness, damping)
-    except IllConditioned:
+    except (IllConditioned, np.linalg.LinAlgError):  # the latter: to the last bit
         k = len(stiffness)
         turn = SPLIT * np.random.default_rng(0).normal(size=(k, k)) / np.sqrt(k)
         both = [_separate_modes(stiffness + way * stiffness @ turn, damping) for way in (1.0, -1.0)]
@@ -245,23 +243,19 @@ def _modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.n
 
 def _separate_modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return _modes of a problem no two of whose modes are one; raises IllConditioned for others."""
-    k, none = len(stiffness), np.zeros((0, 0), complex)
-    if not k:
-        return none.ravel(), none, none
-    scale = np.sqrt(np.abs(stiffness).max())
+    k, scale = len(stiffness), np.sqrt(np.abs(stiffness).max(initial=0.0))
     modes = _lightly_coupled(stiffness, damping) if k >= MANY else None
     if modes:
         values, vectors = modes[0], np.concatenate([modes[1], modes[1] * modes[0] / scale])
     else:
-        matrix = np.zeros((2 * k, 2 * k))
-        matrix[:k, k:], matrix[k:, :k], matrix[k:, k:] = np.eye(k) * scale, -stiffness / scale, -damping
-        values, vectors = np.linalg.eig(matrix)
+        rates = np.concatenate([-stiffness / scale, -damping], axis=1)
+        values, vectors = np.linalg.eig(np.concatenate([np.eye(k, 2 * k, k) * scale, rates]))
         kept = values.imag >= 0.0
         values, vectors = values[kept] + 0j, vectors[:, kept] + 0j
-    if not np.abs(values).min() > 0.0:
+    if not values.all():
         raise IllConditioned("it has no stiffness")
     inverse = _inverse(vectors, values.imag > 0.0)
-    if np.abs(values).max() > APART * np.abs(values).min():
+    if np.abs(values).max(initial=0.0) > APART * np.abs(values).min(initial=np.inf):
         values, shapes = _polish(values, vectors[:k], stiffness, damping)
         vectors = np.concatenate([shapes, shapes * values / scale])
         inverse = _inverse(vectors, values.imag > 0.0)
@@ -271,29 +265,26 @@ def _separate_modes(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndar
 
 
 def _lightly_coupled(stiffness: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return upper eigenvalues (k,) and shapes (k, k) of undamped modes that damping hardly couples, or None."""
+    """Return upper eigenvalues (k,) and shapes (k, k) where damping hardly couples undamped modes, or None."""
     squares, shapes = np.linalg.eig(stiffness)
-    if not squares.real.min() > 0.0:
-        return None
-    if not (modes := fixed_point(np.sqrt(squares), np.linalg.solve(shapes, times(damping, shapes)))):
+    inside = np.linalg.solve(shapes, times(damping, shapes))
+    if not squares.real.min() > 0.0 or not (modes := fixed_point(np.sqrt(squares), inside)):
         return None
     values, shapes = modes[0], times(shapes, modes[1])
     shapes /= np.linalg.norm(shapes, axis=0)
     force = times(stiffness, shapes) + values * (times(damping, shapes) + values * shapes)
-    exact = values.imag.min() > 0.0 and np.abs(force).max() <= SETTLED * np.abs(stiffness).max()
+    exact = values.imag.min() > 0.0 and np.abs(force).max() <= SETTLED / 10 * np.abs(stiffness).max()
     return (values, shapes) if exact else None
 
 
 def _inverse(vectors: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Return the inverse (c, 2k) of vectors (2k, c), of `pairs` one, twice; sets their lengths to one.
-
-    Real and imaginary parts, times sqrt(2), are a pair times a unitary matrix: the condition stays.
-    """
+    """Return the inverse (c, 2k) of vectors (2k, c), of `pairs` one, twice; sets their lengths to one."""
     vectors /= np.linalg.norm(vectors, axis=0)
+    # real and imaginary parts, times sqrt(2), are a pair times a unitary matrix: the condition stays
     factor = np.where(pairs, np.sqrt(2.0), 1.0)
     both = np.concatenate([vectors.real * factor, (vectors.imag * factor)[:, pairs]], axis=1)
     solved = np.linalg.inv(both)
-    # Frobenius' norms, at hand, bound it
+    # which Frobenius' norms bound
     if not np.linalg.norm(both) * np.linalg.norm(solved) <= DEFECTIVE and np.linalg.cond(both) > DEFECTIVE:
         raise IllConditioned("its modes are one to round-off")
     inverse = solved[: len(pairs)] + 0j
@@ -318,12 +309,9 @@ def _polish(
             slope = (2 * value * eye + damping) @ shape
             system = np.block([[force, slope[:, None]], [shape.conj()[None], np.zeros((1, 1))]])
             size = np.maximum(np.abs(system).max(axis=1), np.finfo(float).tiny)
-            try:
+            with suppress(np.linalg.LinAlgError):
                 change = np.linalg.solve(system / size[:, None], np.r_[-(force @ shape), 0.0] / size)
-            except np.linalg.LinAlgError:
-                break
-            if not max(np.abs(change[:-1]).max(), abs(change[-1] / value)) <= REFINED:
-                break
-            shape, value = shape + change[:-1], value + change[-1]
+                if max(np.abs(change[:-1]).max(), abs(change[-1] / value)) <= REFINED:
+                    shape, value = shape + change[:-1], value + change[-1]
         values[n], shapes[:, n] = value, shape
     return values, shapes
