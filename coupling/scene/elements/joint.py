@@ -157,8 +157,8 @@ class Joint(SceneElement):
             yields = (1.0 / given if given else 0.0) + self.residual * parts.flexibility(shares(key))
             if not yields > 0.0:
                 raise InputError(
-                    f"joint[{number}].residual: the modes lack none between {' and '.join(shares(key))}; give stiffnesses, "
-                    "or take few natural modes (structure.natural = true)"
+                    f"joint[{number}].residual: the modes lack none between {' and '.join(shares(key))}; "
+                    "give stiffnesses, or take few natural modes (structure.natural = true)"
                 )
             return 1.0 / yields
 
