@@ -47,9 +47,8 @@ class Joint(SceneElement):
     preload_by_speed: NonNegative = 0.0
     """what the speed of rotation adds to it: preload + preload_by_speed speed^2 [N s^2]"""
     sideways: _Points | Literal[True] | None = None
-    """labels of the motions of the same points along the joint at right angles to between, or true for those of a pair
-    (default: none); needs normal_stiffness or residual. Friction of both directions has its own limit, friction times
-    the normal force (a box)"""
+    """labels of the motions of the same points along it at right angles to between, or true for those of a pair
+    (default: none); needs normal_stiffness or residual. Each direction has its own limit of friction, a box"""
     gap: NonNegative = 0.0
     """distance across the joint at rest; not with a preload [m]"""
     normal_stiffness: Positive | None = None
