@@ -145,7 +145,7 @@ def test_a_wave_of_joints_is_the_long_run_and_the_orbit_of_whole_periods(tmp_pat
     ]
     reduce_ring(LumpedDisk(5).sector(), points, 12).save(tmp_path / "ring.h5")
     scene = vd.Scene(
-        structure={"model": "ring", "file": str(tmp_path / "ring.h5")}, **BLADES[kind],
+        structure={"model": "ring", "file": str(tmp_path / "ring.h5"), "modes": 20}, **BLADES[kind],
         excitation={"frequency": 440.0, "force": 10.0, "at": "along", "wave": 1},
         time={"periods": 1000, "transient": 900}, orbit={"wave": True, "start": "linear"},
     )  # fmt: skip
