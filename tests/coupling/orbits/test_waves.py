@@ -242,7 +242,7 @@ def test_a_border_of_waves_is_that_of_orbits_of_whole_periods(tmp_path):
     own = scene.excitation.frequency
     low, high = (0.9891289894 - 1e-5) * own, (0.9891289894 + 1.2e-5) * own
     track = {"parameter": "excitation.force", "to": 25.1, "kinds": ["peak"], "max_points": 2}
-    table = {"to": high, "step": 0.5, "max_step": 1.0, "min_step": 0.01, "max_points": 8, "track": track}
+    table = {"to": high, "step": 0.2, "max_step": 0.5, "min_step": 0.01, "max_points": 20, "track": track}
     tables = {f"orbit.{name}": value for name, value in table.items()}
     scene = scene.replace({"excitation.frequency": low} | tables)
     (border,) = orbits(scene).borders
