@@ -40,7 +40,7 @@ def contact_name(damper: int, side: str, corner: int = -1) -> str:
     if side == "body":
         return f"bodies {damper} and {damper + 1}"
     owner = "friction damper" if side == "casing" else f"{side} of body" if meets_body(side) else side
-    where = f", corner {corner}" if meets_body(side) else f", {('along', 'sideways')[corner]}"
+    where = f", {('along', 'sideways')[corner]}" if side == "joint" else f", corner {corner}"
     return f"{owner} {damper}" + (where if corner >= 0 else "")
 
 

@@ -34,12 +34,6 @@ class Rows(NamedTuple):
     restitution: np.ndarray
     mass: np.ndarray
 
-    def sharing(self, row: int) -> int:
-        """Return the number of contacts that share a contact's normal force: two of a joint with two directions."""
-        number, side, corner = self.places[row]
-        shared = self.without_body[row] and corner >= 0
-        return sum(place[:2] == (number, side) for place in self.places) if shared else 1
-
 
 def rows_of_units(system: System) -> Rows:
     """Return the rows of a log by units: speeds refer to gaps in the plane, and to bodies along their line."""

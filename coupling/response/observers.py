@@ -14,6 +14,7 @@ from vanedamp.coupling.response.moved_start import as_one
 from vanedamp.coupling.response.plane import planar_samples
 from vanedamp.coupling.response.wear import contact_wear, ledger_warning
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.unit_laws import sharing
 
 
 def samples(each: int) -> Observer:
@@ -93,5 +94,5 @@ def _friction(scene: Scene, run: Outcome, row: int) -> float:
     if side == "casing":
         return scene.friction_damper[number].friction
     if run.system.in_plane and row < run.system.contacts:
-        return float(run.system.friction[row]) / run.rows.sharing(row)
+        return float(run.system.friction[row]) / int(sharing(run.system)[row])
     return scene.damper[number].friction if side == "floor" else 0.0

@@ -12,6 +12,7 @@ from vanedamp.coupling.response.contact_work import ContactWork
 from vanedamp.coupling.response.event_log import rows_of_units
 from vanedamp.coupling.response.wear import patches
 from vanedamp.coupling.scene.scene import Scene
+from vanedamp.coupling.system.unit_laws import sharing
 from vanedamp.coupling.tangents.dual import Dual, zeros
 
 _HOUR = 3600.0
@@ -32,7 +33,7 @@ class Wearing:
         self._dynamics, self._numbers, system = dynamics, numbers, dynamics.system
         rows = rows_of_units(system)
         self._places = [ContactWork(*row, 1.0, 0, np.zeros((0, 2))) for row in rows.places]
-        self._alone, self._sharing = rows.without_body, [rows.sharing(row) for row in range(len(rows.places))]
+        self._alone, self._sharing = rows.without_body, sharing(system)
         scene, u = dynamics.frame.scene, len(self._places)
         self._known = [patch.area is not None for patch in patches(scene, self._places)]
         said = self._said(scene)
@@ -69,7 +70,7 @@ class Wearing:
         for unit in range(len(self._places)):
             coefficient, sliding, impact, area = (self._of[4 * unit + k] for k in range(4))
             if unit < system.contacts:
-                coefficient = Dual(system.friction[unit], of.friction[:, unit]) / self._sharing[unit]
+                coefficient = Dual(system.friction[unit], of.friction[:, unit]) / int(self._sharing[unit])
                 if np.isfinite(system.spring[unit]) and impact.value > 0.0:
                     return None
             rubs = bool(coefficient.value > 0.0)

@@ -71,6 +71,15 @@ def rubs(system: System) -> np.ndarray:
     return np.asarray(~contacts_of(system) | (system.friction > 0.0))
 
 
+def sharing(system: System) -> np.ndarray:
+    """Return by how many a contact's normal force is shared (u,): two of a joint with two directions; others 1."""
+    u = len(system.rest)
+    second = contacts_of(system) & (system.corner == 1)
+    second[1:] &= (system.J[1:u] == system.J[: u - 1]).all(axis=1)
+    second[:1] = False
+    return np.asarray(1 + second + np.r_[second[1:], np.zeros(min(u, 1), bool)])
+
+
 class UnitEvent(NamedTuple):
     """An event that ends a state of a unit, as its function falls through zero.
 

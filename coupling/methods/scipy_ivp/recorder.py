@@ -23,7 +23,7 @@ from vanedamp.coupling.response.records import (
     Records,
 )
 from vanedamp.coupling.system.system import FLOOR, LEFT, RIGHT
-from vanedamp.coupling.system.unit_laws import presses
+from vanedamp.coupling.system.unit_laws import presses, sharing
 
 #: the integrals; behind them, of each contact that yields, its impulses, along and across, and its loss
 _EXCITATION, _VISCOUS, _FRICTION, _CONTACT, _SQUARE, _COS, _SIN, _MOMENTUM_COS, _MOMENTUM_SIN, _COUNT = range(10)
@@ -192,7 +192,7 @@ class Recorder:
 
     def _count(self, t: float, r: int, before: float, after: float, *others: float) -> list[float]:
         # not twice at a joint with two directions, whose contacts have one normal row
-        if self.system.corner[r] < 1 or (self.system.J[r] != self.system.J[r - 1]).any():
+        if self.system.corner[r] < 1 or sharing(self.system)[r] < 2:
             self.impacts += 1
             self.records.impacts[self.period] += 1
             self.records.collided[self.period] += 0.5 * before**2 / self.system.delassus[r, r]
